@@ -1,0 +1,1 @@
+"""Layout rules, uniqueness and predicted pose error (Section 4)."""

@@ -1,0 +1,1 @@
+"""Inverse and forward kinematics of the 6-SPS mechanism (Eq. 29, 30, 33)."""

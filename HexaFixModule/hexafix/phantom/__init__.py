@@ -1,0 +1,1 @@
+"""Seeded synthetic CT of a fixator on a limb, with exact truth."""

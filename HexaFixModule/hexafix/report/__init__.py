@@ -1,0 +1,1 @@
+"""Prescription PDF, pictures, tables: from a finished plan document."""
