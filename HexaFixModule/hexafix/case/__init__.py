@@ -1,0 +1,6 @@
+"""The case: everything the user says, read strictly, every fault named at once."""
+
+from hexafix.case.case import Case, Limb, ScheduleRules
+from hexafix.case.read import case_from_document, load_case, load_layouts
+
+__all__ = ["Case", "Limb", "ScheduleRules", "case_from_document", "load_case", "load_layouts"]

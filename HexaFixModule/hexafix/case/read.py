@@ -1,0 +1,296 @@
+"""From ``case.json`` to a `Case`, naming every fault at once with its JSON path."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from hexafix.case import checks
+from hexafix.case.case import Case, Limb, ScheduleRules
+from hexafix.case.schema import CaseFile, LayoutFile
+from hexafix.case.strict_json import parse_json_object, read_json_object
+from hexafix.correction.targets import (
+    Correction,
+    Deformity,
+    FragmentMotion,
+    Landmarks,
+    TargetPose,
+)
+from hexafix.errors import Fault, InputError
+from hexafix.geometry import Pose
+from hexafix.hardware import Fixator, MarkerLayout, MarkerSite
+from hexafix.hardware.definition import fixator_from_document
+from hexafix.paths import resources
+
+
+def load_case(path: Path, *, needs_image: bool = True, plannable: bool = True) -> Case:
+    """Read a case file.
+
+    Parameters
+    ----------
+    path : Path
+        The case file; its image and fixator paths are relative to it.
+    needs_image : bool
+        Whether the image must be there.
+    plannable : bool
+        Whether readings, correction and schedule must be given.
+
+    Raises
+    ------
+    InputError
+        With every fault found, each at its JSON path.
+    """
+    path = Path(path)
+    if path.is_dir() and (path / "case.json").is_file():
+        path = path / "case.json"
+    raw, _ = read_json_object(path, what="case file")
+    return case_from_document(
+        raw, folder=path.resolve().parent, needs_image=needs_image, plannable=plannable
+    )
+
+
+def case_from_document(
+    raw: bytes, *, folder: Path, needs_image: bool = True, plannable: bool = True
+) -> Case:
+    """A case from the bytes of a case file that lies in `folder`; see `load_case`."""
+    content = parse_json_object(raw, what="case file", where="case.json")
+    faults, broken = _schema_faults(CaseFile, raw)
+    fixator, definition, more = _resolve_fixator(content, broken, folder)
+    faults += more
+    faults += _cross_faults(content, broken, fixator)
+    image = _image_path(content, broken, folder)
+    if needs_image and image is not None and not image.exists():
+        faults.append(
+            Fault(
+                "image-missing",
+                "there is no image at this path",
+                value=str(content["image"]["path"]),
+                where="image.path",
+                next_step="give the DICOM folder or image file relative to the case file",
+            )
+        )
+    if plannable:
+        faults += [
+            Fault(
+                "needed-for-a-plan",
+                "a plan needs this part of the case",
+                where=key,
+                next_step=f"add {key}",
+            )
+            for key in ("strut_readings_mm", "correction", "schedule")
+            if content.get(key) is None and key not in broken
+        ]
+    if faults or fixator is None or image is None:
+        raise InputError(*faults)
+    model = CaseFile.model_validate_json(raw)
+    return _build(model, image=image, fixator=fixator, definition=definition, raw=raw)
+
+
+def load_layouts(path: Path) -> tuple[MarkerLayout, MarkerLayout]:
+    """Proximal and distal layout from a case file or a layout file.
+
+    Raises
+    ------
+    InputError
+        With every fault found.
+    """
+    path = Path(path)
+    if path.is_dir() and (path / "case.json").is_file():
+        path = path / "case.json"
+    raw, content = read_json_object(path, what="layout file")
+    if "case_id" in content or "markers" in content:
+        case = load_case(path, needs_image=False, plannable=False)
+        return case.proximal, case.distal
+    faults, broken = _schema_faults(LayoutFile, raw)
+    if not broken & {"proximal", "distal"}:
+        faults += checks.marker_faults(content, where="")
+    if faults:
+        raise InputError(*faults)
+    model = LayoutFile.model_validate_json(raw)
+    return _layout(model.proximal), _layout(model.distal)
+
+
+def shipped_fixators() -> tuple[str, ...]:
+    """Ids of the definitions that come with HexaFix."""
+    return tuple(sorted(p.stem for p in (resources() / "Hardware" / "Frames").glob("*.json")))
+
+
+def _schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], set[str]]:
+    """Faults against the schema, and the top-level keys that hold one."""
+    try:
+        schema.model_validate_json(raw)
+    except ValidationError as error:
+        rows = error.errors(include_url=False)
+        faults = []
+        for row in rows:
+            unknown = row["type"] == "extra_forbidden"
+            value = None if row["type"] == "missing" or unknown else repr(row["input"])[:60]
+            faults.append(
+                Fault(
+                    "unknown-key" if unknown else "case-value",
+                    "this key is not known" if unknown else row["msg"],
+                    value=value,
+                    where=_json_path(row["loc"]),
+                    hazard="H55",
+                    next_step="remove it or correct its spelling" if unknown else None,
+                )
+            )
+        return faults, {str(row["loc"][0]) for row in rows if row["loc"]}
+    return [], set()
+
+
+def _json_path(location: tuple[int | str, ...]) -> str:
+    """``markers.proximal[0].radius_mm`` from pydantic's location."""
+    kinds = {"target-pose", "fragment-motion", "landmarks", "deformity", "dict[str,any]", "str"}
+    text = ""
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif part not in kinds and part != "[key]":
+            text += f".{part}" if text else part
+    return text
+
+
+def _resolve_fixator(
+    content: dict[str, Any], broken: set[str], folder: Path
+) -> tuple[Fixator | None, dict[str, Any], list[Fault]]:
+    """The fixator by shipped id, path or definition."""
+    if "fixator" in broken or "fixator" not in content:
+        return None, {}, []
+    given = content["fixator"]
+    try:
+        if isinstance(given, str):
+            if given in shipped_fixators():
+                file = resources() / "Hardware" / "Frames" / f"{given}.json"
+            elif (folder / given).is_file():
+                file = folder / given
+            else:
+                raise InputError.of(
+                    "fixator-unknown",
+                    "neither a shipped fixator nor a file",
+                    value=given,
+                    limit="one of " + ", ".join(shipped_fixators()) + ", or a path",
+                    hazard="H23",
+                )
+            _, given = read_json_object(file, what="fixator definition")
+        return fixator_from_document(given), given, []
+    except InputError as error:
+        return (
+            None,
+            {},
+            [
+                Fault(
+                    fault.code,
+                    fault.what,
+                    value=fault.value,
+                    limit=fault.limit,
+                    next_step=fault.next_step,
+                    hazard=fault.hazard or "H23",
+                    where="fixator" + (f".{fault.where}" if fault.where else ""),
+                )
+                for fault in error.faults
+            ],
+        )
+
+
+def _cross_faults(
+    content: dict[str, Any], broken: set[str], fixator: Fixator | None
+) -> list[Fault]:
+    """Faults between parts, for all parts whose own schema holds."""
+    faults: list[Fault] = []
+    if "markers" not in broken:
+        faults += checks.marker_faults(content["markers"])
+        if content.get("numbering") and "numbering" not in broken:
+            faults += checks.numbering_faults(content["numbering"], content["markers"])
+    if content.get("strut_readings_mm") and "strut_readings_mm" not in broken and fixator:
+        faults += checks.reading_faults(content["strut_readings_mm"], fixator)
+    if content.get("correction") and "correction" not in broken:
+        faults += checks.correction_faults(content["correction"])
+    return faults
+
+
+def _image_path(content: dict[str, Any], broken: set[str], folder: Path) -> Path | None:
+    if "image" in broken or "image" not in content:
+        return None
+    return (folder / content["image"]["path"]).resolve()
+
+
+def _layout(markers: list[Any]) -> MarkerLayout:
+    sites = [
+        MarkerSite(m.number, m.radius_mm, float(np.radians(m.sweep_deg)), m.height_mm)
+        for m in markers
+    ]
+    return MarkerLayout(tuple(sorted(sites, key=lambda site: site.number)))
+
+
+def _correction(kind: Any) -> Correction | None:
+    """The domain value of one correction kind, radians inside."""
+    if kind is None:
+        return None
+    if kind.kind == "target-pose":
+        return TargetPose(
+            Pose.from_xyz_fixed(
+                position_mm=kind.position_mm, angles_rad=np.radians(kind.angles_deg)
+            )
+        )
+    if kind.kind == "fragment-motion":
+        return FragmentMotion(moving=kind.moving, motion=Pose.from_matrix(kind.matrix_lps))
+    if kind.kind == "landmarks":
+        return Landmarks(
+            moving=kind.moving,
+            moving_points_mm=np.array(kind.moving_points_lps_mm),
+            fixed_points_mm=np.array(kind.fixed_points_lps_mm),
+        )
+    return Deformity(**kind.model_dump(exclude={"kind"}))
+
+
+def _rules(schedule: Any) -> ScheduleRules | None:
+    if schedule is None:
+        return None
+    points = schedule.structures_at_risk_lps_mm
+    return ScheduleRules(
+        start_date=schedule.start_date,
+        adjustments_per_day=schedule.adjustments_per_day,
+        strut_step_mm=schedule.strut_step_mm,
+        max_rate_mm_per_day=schedule.max_rate_mm_per_day,
+        max_rate_rad_per_day=float(np.radians(schedule.max_rate_deg_per_day)),
+        compensation=schedule.compensation,
+        structures_at_risk_mm=None if points is None else np.array(points, float),
+    )
+
+
+def _build(
+    model: CaseFile, *, image: Path, fixator: Fixator, definition: dict[str, Any], raw: bytes
+) -> Case:
+    document = json.loads(model.model_dump_json())
+    document["fixator"] = definition
+    document["image"] = {"path": None, "series_instance_uid": None}
+    numbering = model.numbering and MappingProxyType(
+        {int(number): np.array(point, float) for number, point in model.numbering.items()}
+    )
+    canonical = json.dumps(definition, sort_keys=True, separators=(",", ":"))
+    return Case(
+        case_id=model.case_id,
+        limb=Limb(model.limb.side, model.limb.bone),
+        image_path=image,
+        series_instance_uid=model.image.series_instance_uid,
+        fixator=fixator,
+        ball_diameter_mm=model.markers.ball_diameter_mm,
+        proximal=_layout(model.markers.proximal),
+        distal=_layout(model.markers.distal),
+        numbering=numbering or None,
+        strut_readings_mm=None
+        if model.strut_readings_mm is None
+        else np.array(model.strut_readings_mm, float),
+        correction=_correction(model.correction),
+        schedule=_rules(model.schedule),
+        document=MappingProxyType(document),
+        case_sha256=hashlib.sha256(raw).hexdigest(),
+        fixator_sha256=hashlib.sha256(canonical.encode()).hexdigest(),
+    )
