@@ -1,6 +1,22 @@
 """Fixators, rings, struts and marker layouts: values, and their JSON definitions."""
 
+from hexafix.hardware.definition import (
+    fixator_from_document,
+    read_fixator,
+    shipped_fixator,
+    shipped_fixators,
+)
 from hexafix.hardware.fixator import Fixator, Ring, StrutType
 from hexafix.hardware.layout import MarkerLayout, MarkerSite
 
-__all__ = ["Fixator", "MarkerLayout", "MarkerSite", "Ring", "StrutType"]
+__all__ = [
+    "Fixator",
+    "MarkerLayout",
+    "MarkerSite",
+    "Ring",
+    "StrutType",
+    "fixator_from_document",
+    "read_fixator",
+    "shipped_fixator",
+    "shipped_fixators",
+]

@@ -1,0 +1,228 @@
+"""Hardware definitions: from JSON to a `Fixator`, strictly, all faults at once."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexafix.errors import Fault, HardwareDefinitionError
+from hexafix.hardware.fixator import Fixator, Ring, StrutType
+from hexafix.paths import resources
+
+SCHEMA_VERSION = 1
+_TOP = ("schema_version", "id", "name", "source", "proximal", "distal", "strut")
+_RING = ("joints_mm", "thickness_mm", "outer_radius_mm")
+_STRUT = ("min_mm", "max_mm", "scale_offset_mm")
+CLOSEST_JOINTS_MM = 1.0
+"""Two joint centres of a ring nearer than this are a typing error."""
+
+
+def shipped_fixators() -> tuple[str, ...]:
+    """The ids of the definitions that come with HexaFix."""
+    return tuple(sorted(path.stem for path in (resources() / "Hardware" / "Frames").glob("*.json")))
+
+
+def shipped_fixator(fixator_id: str = "generic-6sps-160") -> Fixator:
+    """A fixator that comes with HexaFix.
+
+    Raises
+    ------
+    HardwareDefinitionError
+        If there is none with this id.
+    """
+    known = shipped_fixators()
+    if fixator_id not in known:
+        raise HardwareDefinitionError.of(
+            "unknown-fixator",
+            "no shipped hardware definition has this id",
+            value=repr(fixator_id),
+            limit=", ".join(known),
+            next_step="name a shipped id, a path to a definition, or write the definition out",
+            hazard="H23",
+        )
+    return read_fixator(resources() / "Hardware" / "Frames" / f"{fixator_id}.json")
+
+
+def read_fixator(path: str | Path) -> Fixator:
+    """The fixator of a JSON definition file.
+
+    Raises
+    ------
+    HardwareDefinitionError
+        If the file cannot be read, is no strict JSON, or breaks the schema; names every fault.
+    """
+    file = Path(path)
+    try:
+        document = json.loads(
+            file.read_text(encoding="utf-8"),
+            object_pairs_hook=_no_doubled_keys,
+            parse_constant=_no_constant,
+        )
+    except OSError as error:
+        raise HardwareDefinitionError.of(
+            "hardware-unreadable",
+            f"the hardware definition cannot be read: {error.strerror or error}",
+            where=str(file),
+            next_step="check the path",
+        ) from error
+    except ValueError as error:
+        raise HardwareDefinitionError.of(
+            "hardware-not-json",
+            f"the hardware definition is not valid JSON: {error}",
+            where=str(file),
+            next_step="correct the file with a JSON editor",
+        ) from error
+    return fixator_from_document(document, where=file.name)
+
+
+def fixator_from_document(document: Any, *, where: str = "fixator") -> Fixator:
+    """The fixator of a parsed definition.
+
+    Parameters
+    ----------
+    document : object
+        The parsed JSON; must be an object of the contract's schema, lengths in mm, joint centres
+        in the ring frames {A} and {B}.
+    where : str
+        JSON path or file that holds it, for the faults.
+
+    Raises
+    ------
+    HardwareDefinitionError
+        With every fault found: unknown or missing keys, wrong version, wrong shapes, numbers that
+        are not finite or out of range.
+    """
+    check = _Check()
+    top = check.keys(document, _TOP, where)
+    if "schema_version" in top and (
+        isinstance(top["schema_version"], bool) or top["schema_version"] != SCHEMA_VERSION
+    ):
+        check.fault(
+            "schema-version",
+            "unknown schema version",
+            f"{where}.schema_version",
+            repr(top["schema_version"]),
+            str(SCHEMA_VERSION),
+        )
+    texts = {key: check.text(top, key, where) for key in ("id", "name", "source")}
+    rings = {key: check.ring(top.get(key), f"{where}.{key}") for key in _TOP[4:6] if key in top}
+    strut = check.strut(top["strut"], f"{where}.strut") if "strut" in top else None
+    proximal, distal = rings.get("proximal"), rings.get("distal")
+    if check.faults or proximal is None or distal is None or strut is None:
+        raise HardwareDefinitionError(*check.faults)
+    return Fixator(**texts, proximal=proximal, distal=distal, strut=strut)
+
+
+def _no_doubled_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    keys = [key for key, _ in pairs]
+    doubled = sorted({key for key in keys if keys.count(key) > 1})
+    if doubled:
+        raise ValueError(f"key given twice: {', '.join(doubled)}")
+    return dict(pairs)
+
+
+def _no_constant(word: str) -> float:
+    raise ValueError(f"{word} is not a number of JSON")
+
+
+def _is_number(value: Any) -> bool:
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and abs(value) <= 1e300
+        and math.isfinite(value)
+    )
+
+
+class _Check:
+    """Collects the faults of one definition."""
+
+    def __init__(self) -> None:
+        self.faults: list[Fault] = []
+
+    def fault(
+        self, code: str, what: str, where: str, value: str | None = None, limit: str | None = None
+    ) -> None:
+        step = "correct the hardware definition"
+        self.faults.append(Fault(code, what, value, limit, step, "H23", where))
+
+    def keys(self, value: Any, known: tuple[str, ...], where: str) -> Mapping[str, Any]:
+        """The object's known entries; unknown and missing keys are faults."""
+        if not isinstance(value, Mapping):
+            self.fault("wrong-type", "an object is needed", where, type(value).__name__)
+            return {}
+        for key in value:
+            if key not in known:
+                self.fault("unknown-key", "unknown key", f"{where}.{key}", None, ", ".join(known))
+        for key in known:
+            if key not in value and key != "scale_offset_mm":
+                self.fault("missing-key", "this key is missing", f"{where}.{key}")
+        return {key: value[key] for key in known if key in value}
+
+    def text(self, document: Mapping[str, Any], key: str, where: str) -> str:
+        value = document.get(key, "")
+        if key in document and (not isinstance(value, str) or not value.strip()):
+            self.fault("wrong-type", "a text is needed", f"{where}.{key}", repr(value))
+        return value if isinstance(value, str) else ""
+
+    def number(self, entries: Mapping[str, Any], key: str, where: str, low: float) -> float:
+        """The number `entries[key]`, above `low`; NaN stands for one already faulted."""
+        if key not in entries:
+            return math.nan
+        value = entries[key]
+        if not _is_number(value):
+            self.fault("not-a-number", "a finite number is needed", f"{where}.{key}", repr(value))
+            return math.nan
+        if value <= low:
+            self.fault("out-of-range", "too small", f"{where}.{key}", f"{value} mm", f"> {low} mm")
+            return math.nan
+        return float(value)
+
+    def ring(self, value: Any, where: str) -> Ring | None:
+        entries = self.keys(value, _RING, where)
+        before = len(self.faults)
+        thickness = self.number(entries, "thickness_mm", where, 0.0)
+        radius = self.number(entries, "outer_radius_mm", where, 0.0)
+        joints = self.joints(entries["joints_mm"], where) if "joints_mm" in entries else None
+        if joints is None or len(self.faults) > before or not math.isfinite(thickness + radius):
+            return None
+        return Ring(joints, thickness, radius)
+
+    def joints(self, value: Any, ring: str) -> np.ndarray | None:
+        where = f"{ring}.joints_mm"
+        if not isinstance(value, list | tuple) or len(value) != 6:
+            got = f"{len(value)} entries" if isinstance(value, list | tuple) else repr(value)
+            self.fault("wrong-shape", "six joint centres are needed", where, got, "6 × [x, y, z]")
+            return None
+        good = True
+        for index, row in enumerate(value):
+            if not isinstance(row, list | tuple) or len(row) != 3 or not all(map(_is_number, row)):
+                good = False
+                what = "three finite numbers are needed"
+                self.fault("wrong-shape", what, f"{where}[{index}]", repr(row), "[x, y, z] mm")
+        if not good:
+            return None
+        joints = np.array(value, float)
+        gaps = np.linalg.norm(joints[:, None] - joints[None], axis=-1)[np.triu_indices(6, 1)]
+        if gaps.min() < CLOSEST_JOINTS_MM:
+            what = "two joint centres of this ring coincide"
+            limit = f"≥ {CLOSEST_JOINTS_MM} mm apart"
+            self.fault("joints-coincide", what, where, f"{gaps.min():.3f} mm", limit)
+            return None
+        return joints
+
+    def strut(self, value: Any, where: str) -> StrutType | None:
+        entries = self.keys(value, _STRUT, where)
+        low = self.number(entries, "min_mm", where, 0.0)
+        high = self.number(entries, "max_mm", where, 0.0)
+        offset = self.number({"scale_offset_mm": 0.0, **entries}, "scale_offset_mm", where, -1e6)
+        if low >= high:
+            what = "the shortest length is not below the longest"
+            self.fault("out-of-range", what, f"{where}.min_mm", f"{low} mm", f"< {high} mm")
+            return None
+        return StrutType(low, high, offset) if math.isfinite(low + high + offset) else None
