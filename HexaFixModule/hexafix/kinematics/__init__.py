@@ -2,7 +2,7 @@
 
 from hexafix.kinematics.basin import BasinCheck, second_starts
 from hexafix.kinematics.forward import (
-    ForwardBatch,
+    MAX_CONDITION,
     ForwardSolution,
     forward_kinematics,
     forward_kinematics_batch,
@@ -15,8 +15,10 @@ from hexafix.kinematics.inverse import (
     strut_lengths,
     strut_lengths_batch,
 )
+from hexafix.kinematics.newton import ForwardBatch
 
 __all__ = [
+    "MAX_CONDITION",
     "BasinCheck",
     "ForwardBatch",
     "ForwardSolution",

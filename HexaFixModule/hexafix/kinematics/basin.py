@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
-from hexafix.kinematics.forward import TOLERANCE_MM, _rotations, _solve_rows
+from hexafix.kinematics.newton import rotations_of, solve_rows
 
 SPREAD_MM, SPREAD_RAD = 15.0, float(np.radians(10.0))
 """How far the second starts lie from the solution: ten times the largest error that the gate on
@@ -67,10 +67,13 @@ def second_starts(
     shifts *= SPREAD_MM / np.linalg.norm(shifts, axis=1, keepdims=True)
     turns *= SPREAD_RAD / np.linalg.norm(turns, axis=1, keepdims=True)
     lengths = np.broadcast_to(np.asarray(lengths_mm, float), (count, 6))
-    batch = _solve_rows(
-        lengths, fixator, solution.rotation @ _rotations(turns), solution.position_mm + shifts
+    batch = solve_rows(
+        lengths,
+        fixator,
+        start_rotations=solution.rotation @ rotations_of(turns),
+        start_positions=solution.position_mm + shifts,
     )
-    arrived = batch.residual_mm <= TOLERANCE_MM
+    arrived = batch.arrived
     distance = np.linalg.norm(batch.positions_mm - solution.position_mm, axis=1)
     chord = np.linalg.norm(batch.rotations - solution.rotation, axis=(1, 2)) / np.sqrt(8.0)
     angle = 2.0 * np.arcsin(np.minimum(chord, 1.0))

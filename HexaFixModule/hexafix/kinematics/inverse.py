@@ -137,7 +137,6 @@ def condition_number(jacobian: ArrayLike, *, length_mm: float) -> NDArray[np.flo
     """
     scaled = np.array(jacobian, float)
     scaled[..., 3:] /= length_mm
-    values = np.asarray(np.linalg.svd(scaled, compute_uv=False), float)
-    smallest = values[..., -1]
+    values = np.linalg.svd(scaled, compute_uv=False)
     with np.errstate(divide="ignore"):
-        return values[..., 0] / smallest
+        return np.divide(values[..., 0], values[..., -1], dtype=float)
