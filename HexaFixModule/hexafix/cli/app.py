@@ -1,0 +1,234 @@
+"""The commands of ``hexafix``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from hexafix import __version__
+from hexafix.cli.console import print_json, progress_bar, report_error
+from hexafix.errors import HexaFixError
+
+NOTICE = "Research software, not a medical device."
+
+app = App(
+    name="hexafix",
+    help=f"From a CT of a hexapod external fixator to a verified strut schedule. {NOTICE}",
+    version=f"hexafix {__version__}",
+    help_format="plaintext",
+)
+
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document.")]
+Quiet = Annotated[bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress.")]
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run a command and exit with 0 done, 2 wrong input, 3 refused, 1 a defect of HexaFix."""
+    tokens = list(sys.argv[1:] if argv is None else argv)
+    try:
+        result = app(tokens, result_action="return_value")
+        code = result if isinstance(result, int) else 0
+    except HexaFixError as error:
+        code = report_error(error, as_json="--json" in tokens)
+    except KeyboardInterrupt:
+        print("hexafix: stopped; nothing was written", file=sys.stderr)
+        code = 130
+    except BrokenPipeError:
+        code = 0
+    except Exception as error:
+        code = _defect(error)
+    sys.exit(code)
+
+
+def _defect(error: Exception) -> int:
+    """Tell a defect without its values: they could hold patient data."""
+    import os
+    import traceback
+
+    if os.environ.get("HEXAFIX_DEBUG"):
+        traceback.print_exception(error)
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(frame.filename).name}:{frame.lineno}"
+    print(
+        f"hexafix: a defect of HexaFix: {type(error).__name__} at {place}. Nothing was written. "
+        "Set HEXAFIX_DEBUG=1 for the traceback.",
+        file=sys.stderr,
+    )
+    return 1
+
+
+@app.command
+def demo(
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the synthetic CT and the export.")] = Path(
+        "hexafix-demo"
+    ),
+    seed: Annotated[int, Parameter(help="Same seed, same phantom.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Build a synthetic CT of a fixator on a limb and plan it as if you had brought it."""
+    from hexafix.cli.demo import run_demo
+
+    with progress_bar(quiet=quiet) as progress:
+        summary, text = run_demo(out, seed=seed, progress=progress)
+    print_json(summary) if json else print(text)
+    return 0
+
+
+@app.command
+def phantom(
+    out: Annotated[Path, Parameter(help="Folder to make.")],
+    *,
+    seed: Annotated[int, Parameter(help="Same seed, same phantom.")] = 1,
+    image_format: Annotated[
+        Literal["dicom", "nrrd"], Parameter(name="--format", help="How the CT is stored.")
+    ] = "dicom",
+    size: Annotated[tuple[int, int, int] | None, Parameter(help="Voxels along i, j and k.")] = None,
+    spacing_mm: Annotated[
+        tuple[float, float, float] | None, Parameter(help="Voxel pitch along i, j and k.")
+    ] = None,
+    noise_hu: Annotated[float | None, Parameter(help="Standard deviation of the noise.")] = None,
+    streaks_hu: Annotated[float | None, Parameter(help="Amplitude of metal streaks.")] = None,
+    side: Annotated[Literal["left", "right"] | None, Parameter(help="Side of the limb.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make only the synthetic CT, with truth.json and a ready case.json."""
+    from hexafix.cli.demo import run_phantom
+
+    with progress_bar(quiet=quiet) as progress:
+        truth = run_phantom(
+            out,
+            seed=seed,
+            image_format=image_format,
+            options={
+                "size_ijk": size,
+                "spacing_mm": spacing_mm,
+                "noise_hu": noise_hu,
+                "streaks_hu": streaks_hu,
+                "side": side,
+            },
+            progress=progress,
+        )
+    print_json(truth) if json else print(f"phantom, truth.json and case.json are in {out}")
+    return 0
+
+
+@app.command
+def markers(
+    image: Annotated[Path, Parameter(help="DICOM folder, NRRD, NIfTI or MetaImage file.")],
+    *,
+    diameter_mm: Annotated[float, Parameter(help="Diameter of the marker balls.")],
+    series: Annotated[
+        str | None, Parameter(help="SeriesInstanceUID, if there are several.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Find the marker balls of a CT; nothing else is needed."""
+    from hexafix.cli.show import balls_document, balls_text
+    from hexafix.pipeline import find_markers
+
+    with progress_bar(quiet=quiet) as progress:
+        balls = find_markers(
+            image, ball_diameter_mm=diameter_mm, series_instance_uid=series, progress=progress
+        )
+    print_json(balls_document(balls)) if json else print(balls_text(balls))
+    return 0
+
+
+@app.command
+def recognise(
+    case: Annotated[Path, Parameter(help="The case file.")],
+    *,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Recognise the poses of both rings and of the mechanism."""
+    from hexafix.case import load_case
+    from hexafix.cli.show import recognition_text
+    from hexafix.pipeline import recognise_case
+
+    loaded = load_case(case, plannable=False)
+    with progress_bar(quiet=quiet) as progress:
+        document = recognise_case(loaded, progress=progress)
+    print_json(document) if json else print(recognition_text(document))
+    return 0
+
+
+@app.command(name="check-layout")
+def check_layout(
+    case_or_layout: Annotated[Path, Parameter(help="A case file or a layout file.")],
+    *,
+    json: Json = False,
+) -> int:
+    """Check a marker layout before the CT: angles, uniqueness, predicted error, a better one."""
+    from hexafix.case import load_layouts
+    from hexafix.cli.show import layout_text
+    from hexafix.pipeline import check_case_layout
+
+    document = check_case_layout(*load_layouts(case_or_layout))
+    print_json(document) if json else print(layout_text(document))
+    return 0
+
+
+@app.command
+def plan(
+    case: Annotated[Path, Parameter(help="The case file.")],
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the export.")],
+    accept_relaxed_layout: Annotated[
+        bool,
+        Parameter(negative="", help="Accept a layout that keeps only the relaxed angle rule."),
+    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Run the whole chain and write the export: plan, schedule, PDF, markers, manifest."""
+    from hexafix.case import load_case
+    from hexafix.cli.show import plan_text
+    from hexafix.export import check_target
+    from hexafix.pipeline import plan_and_export
+
+    check_target(out)
+    loaded = load_case(case)
+    with progress_bar(quiet=quiet) as progress:
+        document = plan_and_export(
+            loaded, out, accept_relaxed_layout=accept_relaxed_layout, progress=progress
+        )
+    print_json(document) if json else print(plan_text(document, out))
+    return 0
+
+
+@app.command
+def verify(
+    folder: Annotated[Path, Parameter(help="An export of hexafix plan.")],
+    *,
+    json: Json = False,
+) -> int:
+    """Read an export back and recompute it by an independent road."""
+    from hexafix.cli.show import verdict_text
+    from hexafix.verify import verify_export
+
+    verdict = verify_export(folder)
+    print_json(verdict) if json else print(verdict_text(verdict))
+    return 0 if verdict["verified"] else 3
+
+
+@app.command
+def benchmark(
+    *names: Annotated[str, Parameter(help="Which measurements; none means all.")],
+    quick: Annotated[bool, Parameter(negative="", help="Small samples, for a first look.")] = False,
+    json: Json = False,
+) -> int:
+    """Measure HexaFix against its goals and against what one would otherwise write."""
+    from hexafix.benchmark.run import print_rows, run
+
+    rows = run(names, quick=quick)
+    print_json(rows) if json else print_rows(rows)
+    return 0 if all(row["met"] for row in rows) else 1

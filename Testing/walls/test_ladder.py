@@ -1,0 +1,165 @@
+"""Arrows go only down the ladder of rooms, and a plain import stays small."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "HexaFixModule" / "hexafix"
+
+LADDER = {
+    "__init__": 0,
+    "errors": 0,
+    "paths": 0,
+    "progress": 0,
+    "geometry": 1,
+    "hardware": 2,
+    "imaging": 2,
+    "markers": 3,
+    "recognition": 4,
+    "kinematics": 4,
+    "accuracy": 5,
+    "correction": 5,
+    "phantom": 5,
+    "case": 6,
+    "gates": 6,
+    "report": 7,
+    "export": 7,
+    "verify": 7,
+    "pipeline": 8,
+    "cli": 9,
+    "benchmark": 9,
+}
+"""Each room's level: a room may import rooms of lower levels only."""
+
+SIDEWAYS_OR_DOORS = {"vtk", "vtkmodules", "pyvista", "slicer", "qt", "ctk", "qtpy", "PySide6",
+                     "trame", "trame_slicer", "matplotlib", "skimage"}  # fmt: skip
+"""Optional libraries: never imported at a module's top level."""
+
+LIBRARIES = {
+    "errors": set(),
+    "paths": set(),
+    "progress": set(),
+    "geometry": {"numpy", "scipy"},
+    "hardware": {"numpy"},
+    "imaging": {"numpy", "pydicom", "SimpleITK", "scipy"},
+    "markers": {"numpy", "scipy"},
+    "recognition": {"numpy", "scipy"},
+    "kinematics": {"numpy", "scipy"},
+    "accuracy": {"numpy", "scipy"},
+    "correction": {"numpy", "scipy"},
+    "phantom": {"numpy", "scipy", "pydicom", "SimpleITK"},
+    "case": {"numpy", "pydantic"},
+    "gates": {"numpy"},
+    "export": set(),
+    "report": {"numpy", "scipy", "typst", "vtkmodules"},
+    "verify": {"numpy", "scipy", "pypdf"},
+    "pipeline": {"numpy", "scipy"},
+    "cli": {"cyclopts", "rich"},
+    "benchmark": {"numpy", "scipy", "SimpleITK", "skimage", "vtkmodules", "psutil"},
+}
+"""What each room may use besides the standard library, anywhere in its files."""
+
+
+def files():
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def room(path):
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path, *, top_level_only=False):
+    tree = ast.parse(path.read_text())
+    hidden = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            hidden |= {id(inner) for inner in ast.walk(node)}
+    nodes = tree.body if top_level_only else ast.walk(tree)
+    for node in nodes:
+        if id(node) in hidden:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield node.module
+            if node.module == "hexafix":
+                yield from (f"hexafix.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_a_room_imports_only_rooms_below_it(path):
+    own = room(path)
+    for name in imports(path):
+        parts = name.split(".")
+        if parts[0] == "hexafix" and len(parts) > 1 and parts[1] in LADDER:
+            other = parts[1]
+            assert other == own or LADDER[other] < LADDER[own], f"{own} imports {other}"
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_a_room_uses_only_its_libraries(path):
+    own = room(path)
+    if own == "__init__":
+        return
+    used = {name.split(".")[0] for name in imports(path)} - set(sys.stdlib_module_names)
+    assert used - {"hexafix"} <= LIBRARIES[own]
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_optional_libraries_are_imported_where_they_are_used(path):
+    top = {name.split(".")[0] for name in imports(path, top_level_only=True)}
+    assert not top & SIDEWAYS_OR_DOORS
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_no_file_is_longer_than_400_lines_and_no_function_than_60(path):
+    text = path.read_text()
+    assert text.count("\n") <= 400
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) else node.body
+            if body:
+                length = body[-1].end_lineno - body[0].lineno + 1
+                assert length <= 60, f"{node.name} has {length} lines"
+
+
+def test_every_room_stands_on_the_ladder():
+    assert {room(path) for path in files()} <= set(LADDER)
+
+
+def modules_after(code):
+    listing = f"{code}\nimport sys\nprint(*sorted({{m.split('.')[0] for m in sys.modules}}))"
+    run = subprocess.run(
+        [sys.executable, "-c", listing],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PYTHONPATH": str(PACKAGE.parent), "PATH": ""},
+    )
+    return set(run.stdout.split())
+
+
+def test_a_plain_import_pulls_in_nothing_heavy():
+    loaded = modules_after("import hexafix")
+    assert not loaded & {"numpy", "scipy", "pydantic", "SimpleITK", "pydicom", "vtk", "typst"}
+
+
+def test_the_command_line_starts_without_the_chain():
+    loaded = modules_after("import hexafix.cli")
+    assert not loaded & {"numpy", "scipy", "pydantic", "SimpleITK", "pydicom", "vtk", "typst"}
+
+
+def test_the_chain_imports_no_toolkit():
+    loaded = modules_after("import hexafix.pipeline, hexafix.verify")
+    assert not loaded & (SIDEWAYS_OR_DOORS - {"matplotlib"})
+
+
+def test_the_slicer_entrance_imports_without_slicer_and_does_no_arithmetic():
+    entrance = PACKAGE.parent / "HexaFixModule.py"
+    names = {name.split(".")[0] for name in imports(entrance)}
+    assert names <= {"hexafix", "slicer", "sys", "pathlib", "typing", "tempfile", "__future__"}
+    assert "HexaFixModule" in modules_after("import HexaFixModule")
