@@ -1,0 +1,57 @@
+"""The voxels around one candidate, sampled by cubic splines at LPS points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, spline_filter
+
+from hexafix.imaging.volume import Volume
+
+
+@dataclass(frozen=True, eq=False)
+class Crop:
+    """A small box of a volume.
+
+    Attributes
+    ----------
+    voxels : ndarray, shape (K, J, I)
+        HU as floats.
+    first_ijk : ndarray, shape (3,)
+        Volume index of the crop's first voxel.
+    volume : Volume
+        Where it was taken from.
+    """
+
+    voxels: NDArray[np.float64]
+    first_ijk: NDArray[np.int64]
+    volume: Volume
+
+    @classmethod
+    def around(cls, volume: Volume, center_mm: NDArray[np.float64], reach_mm: float) -> Crop:
+        """The box that holds every voxel within `reach_mm` of a point, LPS mm."""
+        middle = volume.ijk_from_lps(center_mm)
+        reach = reach_mm * np.linalg.norm(np.linalg.inv(volume.ijk_to_lps[:3, :3]), axis=1)
+        first = np.maximum(np.floor(middle - reach).astype(int), 0)
+        last = np.minimum(np.ceil(middle + reach).astype(int) + 1, volume.size_ijk)
+        box = volume.voxels[first[2] : last[2], first[1] : last[1], first[0] : last[0]]
+        return cls(np.array(box, float), first, volume)
+
+    @cached_property
+    def _spline(self) -> NDArray[np.float64]:
+        return spline_filter(self.voxels, order=3, mode="mirror")
+
+    def sample(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """HU at LPS points, shape (..., 3) to (...), by the cubic spline through the voxels."""
+        index = self.volume.ijk_from_lps(points_mm) - self.first_ijk
+        flat = index[..., ::-1].reshape(-1, 3).T
+        values = map_coordinates(self._spline, flat, order=3, mode="mirror", prefilter=False)
+        return values.reshape(index.shape[:-1])
+
+    def points_mm(self) -> NDArray[np.float64]:
+        """LPS of every voxel, shape (K, J, I, 3), mm."""
+        k, j, i = np.meshgrid(*[np.arange(n) for n in self.voxels.shape], indexing="ij")
+        return self.volume.lps_from_ijk(np.stack([i, j, k], -1) + self.first_ijk)

@@ -1,0 +1,227 @@
+"""All marker balls of one diameter in a whole volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexafix.errors import InputError
+from hexafix.imaging.volume import Volume
+from hexafix.markers import predicates
+from hexafix.markers.ball import Ball, BallSet, Rejected
+from hexafix.markers.crop import Crop
+from hexafix.markers.directions import sphere_directions
+from hexafix.markers.model import ModelFit, fit_model
+from hexafix.markers.rays import DIRECTIONS, RayFit, fit_rays
+from hexafix.markers.search import candidate_centers
+from hexafix.markers.uncertainty import centre_covariance
+from hexafix.progress import Progress, silent
+
+THICK_SLICES_MM = 2.0
+"""Above this the model fit gives the centre, and a warning."""
+CLIPPED_SHARE = 0.20
+"""Share of clipped voxels in a ball that is warned about."""
+DISAGREEMENT_MM = 0.06
+"""Rays and model farther apart than this (and 4 σ) are warned about."""
+MOST_LOCAL = 96
+"""At most so many candidates are fitted."""
+SURROUND_MM = 4.5
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A candidate that passed every test of its own."""
+
+    ball: Ball
+    contrast_hu: float
+
+
+def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = silent) -> BallSet:
+    """Find and fit every ball of the given diameter.
+
+    Parameters
+    ----------
+    volume : Volume
+        Any orientation, handedness and voxel size.
+    ball_diameter_mm : float
+        Nominal diameter.
+    progress : Progress
+
+    Returns
+    -------
+    BallSet
+        Balls in the order of their S, P and L coordinate; candidates that failed a test with the
+        test's value and limit.
+
+    Raises
+    ------
+    InputError
+        If the diameter is not positive, or too small for the voxels.
+    """
+    _check_diameter(volume, ball_diameter_mm)
+    radius = ball_diameter_mm / 2.0
+    points = candidate_centers(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
+    top = volume.voxels.max() if volume.voxels.size else 0
+    fitted: list[_Fitted] = []
+    rejected: list[Rejected] = []
+    for number, point in enumerate(points[:MOST_LOCAL]):
+        progress("fitting balls", number / min(len(points), MOST_LOCAL))
+        result = _judge(volume, point, radius, float(top))
+        if isinstance(result, Rejected):
+            rejected.append(result)
+        elif result is not None:
+            fitted.append(result)
+    fitted, doubled = _apart(fitted, radius)
+    fitted, odd = _alike(fitted)
+    balls = tuple(sorted((f.ball for f in fitted), key=lambda b: tuple(b.center_mm[::-1])))
+    away = _distinct(rejected + doubled + odd, balls, radius)
+    progress("fitting balls", 1.0)
+    return BallSet(balls, away, _warnings(volume, balls, len(points)))
+
+
+def _check_diameter(volume: Volume, diameter: float) -> None:
+    least = 4.0 * float(np.median(volume.spacing_mm))
+    if not np.isfinite(diameter) or diameter <= 0.0 or diameter < least:
+        raise InputError.of(
+            "ball-diameter",
+            "the ball's diameter is too small for these voxels",
+            value=f"{diameter:g} mm",
+            limit=f"at least {least:.2f} mm, four voxels",
+            hazard="H15",
+            where="ball_diameter_mm",
+            next_step="give the diameter in mm, or scan with smaller voxels",
+        )
+
+
+def _judge(
+    volume: Volume, point: NDArray[np.float64], radius: float, top: float
+) -> _Fitted | Rejected | None:
+    """Fit one candidate and test it; None when nothing round is there."""
+    reason = predicates.border_failure(volume, point, radius)
+    if reason is not None:
+        return Rejected(point, reason)
+    crop = Crop.around(volume, point, radius + SURROUND_MM)
+    rays = fit_rays(crop, point, radius)
+    if rays is None or np.linalg.norm(rays.center_mm - point) > 0.8 * radius:
+        return None
+    reason = predicates.border_failure(volume, rays.center_mm, radius)
+    if reason is not None:
+        return Rejected(rays.center_mm, reason)
+    clipped = _clipped_share(crop, rays, radius, top)
+    clip_hu = top if clipped > 0.02 else None
+    thick = float(volume.spacing_mm.max()) > THICK_SLICES_MM
+    kept = None if rays.cut_share == 0.0 else sphere_directions(DIRECTIONS)[~rays.cut]
+    model = fit_model(crop, rays.center_mm, radius, kept=kept, clip_hu=clip_hu, all_voxels=thick)
+    fitted = rays.radius_mm if model is None or clip_hu is not None else model.radius_mm
+    reasons = [
+        *predicates.shape_failures(
+            volume, rays, fitted_mm=fitted, radius_mm=radius, clipped=clip_hu is not None
+        ),
+        *predicates.model_failures(model, rays),
+    ]
+    stem = predicates.stem_failure(crop, rays, radius)
+    reasons += [stem] if stem else []
+    if reasons:
+        return Rejected(rays.center_mm, "; ".join(reasons))
+    ball = _ball(rays, model, fitted, thick=thick, clipped=clipped)
+    return _Fitted(ball, rays.core_hu - rays.outside_hu)
+
+
+def _clipped_share(crop: Crop, rays: RayFit, radius: float, top: float) -> float:
+    """Share of the ball's voxels at the volume's greatest value."""
+    inside = np.linalg.norm(crop.points_mm() - rays.center_mm, axis=-1) < 0.8 * radius
+    return float(np.mean(crop.voxels[inside] >= top)) if inside.any() else 0.0
+
+
+def _ball(
+    rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool, clipped: float
+) -> Ball:
+    """The value, with its covariance and what the user should look at."""
+    by_model = thick and model is not None
+    center = model.center_mm if by_model and model is not None else rays.center_mm
+    covariance = centre_covariance(rays, model)
+    warnings = []
+    if clipped > CLIPPED_SHARE:
+        warnings.append(
+            f"{clipped:.0%} of the ball is clipped (limit {CLIPPED_SHARE:.0%}): "
+            "fitted by its edges only (H11)"
+        )
+    if model is not None:
+        apart = float(np.linalg.norm(model.center_mm - rays.center_mm))
+        if apart > max(DISAGREEMENT_MM, 4.0 * float(np.sqrt(np.trace(covariance)))):
+            warnings.append(f"the two fits of this ball lie {apart:.2f} mm apart")
+    return Ball(
+        center, 2.0 * fitted, covariance, rays.rms_mm, rays.core_hu,
+        "model-fit" if by_model else "gradient-rays", tuple(warnings),
+    )  # fmt: skip
+
+
+def _apart(fitted: list[_Fitted], radius: float) -> tuple[list[_Fitted], list[Rejected]]:
+    """One fit for each ball; of two that would overlap only the rounder one."""
+    kept: list[_Fitted] = []
+    doubled: list[Rejected] = []
+    for one in sorted(fitted, key=lambda f: f.ball.rms_residual_mm):
+        gaps = [float(np.linalg.norm(one.ball.center_mm - k.ball.center_mm)) for k in kept]
+        nearest = min(gaps, default=np.inf)
+        if nearest >= 2.0 * radius - 0.6:
+            kept.append(one)
+        elif nearest > 0.5 * radius:
+            reason = f"overlap: {nearest:.1f} mm from another ball, limit {2 * radius:.1f} mm"
+            doubled.append(Rejected(one.ball.center_mm, reason))
+    return kept, doubled
+
+
+def _alike(fitted: list[_Fitted]) -> tuple[list[_Fitted], list[Rejected]]:
+    """Drop what is not of the others' material, where a clear majority agrees."""
+    if len(fitted) < 3:
+        return fitted, []
+    cores = np.array([f.ball.core_hu for f in fitted])
+    contrast = np.array([f.contrast_hu for f in fitted])
+    reach = predicates.CORE_SHARE * np.median(contrast)
+    votes = (np.abs(cores[:, None] - cores) <= reach).sum(axis=1)
+    middle = float(np.median(cores[np.abs(cores - cores[np.argmax(votes)]) <= reach]))
+    same = np.abs(cores - middle) <= reach
+    if same.sum() <= 0.6 * len(fitted):
+        return fitted, []
+    odd = [
+        Rejected(
+            f.ball.center_mm,
+            f"core HU: {f.ball.core_hu:.0f}, limit {middle:.0f} ± {reach:.0f} as the others",
+        )
+        for f, ok in zip(fitted, same, strict=True)
+        if not ok
+    ]
+    return [f for f, ok in zip(fitted, same, strict=True) if ok], odd
+
+
+def _distinct(
+    rejected: list[Rejected], balls: tuple[Ball, ...], radius: float
+) -> tuple[Rejected, ...]:
+    """Rejected candidates that are neither on an accepted ball nor listed twice."""
+    places = [ball.center_mm for ball in balls]
+    listed: list[Rejected] = []
+    for one in rejected:
+        if all(np.linalg.norm(one.center_mm - place) > 0.8 * radius for place in places):
+            places.append(one.center_mm)
+            listed.append(replace(one, center_mm=np.asarray(one.center_mm)))
+    return tuple(listed)
+
+
+def _warnings(volume: Volume, balls: tuple[Ball, ...], candidates: int) -> tuple[str, ...]:
+    """What concerns the whole search."""
+    warnings = []
+    thickest = float(volume.spacing_mm.max())
+    if thickest > THICK_SLICES_MM:
+        warnings.append(
+            f"slices are {thickest:.2f} mm apart (limit {THICK_SLICES_MM:g} mm): "
+            "centres come from the model fit and are less certain"
+        )
+    if candidates > MOST_LOCAL:
+        warnings.append(f"{candidates} places looked like a ball, {MOST_LOCAL} were fitted")
+    if len(balls) > 2:
+        cores = [ball.core_hu for ball in balls]
+        if max(cores) - min(cores) > 0.3 * (max(cores) + 1000.0):
+            warnings.append("the balls differ in density: not all may be marker balls (H15)")
+    return tuple(warnings)

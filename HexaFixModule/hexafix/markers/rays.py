@@ -1,0 +1,213 @@
+"""The ball's centre from the steepest gradient along rays, the rod's side left out.
+
+Edges are cut in antipodal pairs, so that cupping and blur act on the radius and not on the centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexafix.markers.crop import Crop
+from hexafix.markers.directions import neighbour_average, sphere_directions
+
+DIRECTIONS = 600
+STEP_MM = 0.2
+SMOOTH_MM = 0.35
+"""Gaussian smoothing along a ray before the gradient is taken."""
+SMOOTH_RAD = 0.08
+"""Gaussian smoothing across neighbouring rays."""
+WINDOW_MM = 1.6
+"""An edge lies within this distance of the nominal radius."""
+WEAK_SHARE = 0.4
+"""Edges weaker than this share of the median are dropped."""
+TUKEY = 4.685
+FEW_LEFT = 0.45
+"""With fewer directions left than this share, antipodes of cut directions are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayFit:
+    """Sphere through the edge points of the rays.
+
+    Attributes
+    ----------
+    center_mm : ndarray, shape (3,)
+        LPS mm.
+    radius_mm : float
+        Of the steepest gradient.
+    residual_mm : ndarray, shape (DIRECTIONS,)
+        Edge distance minus radius, NaN where the direction was cut or has no edge.
+    weight : ndarray, shape (DIRECTIONS,)
+        Tukey weights, 0 where there is no edge.
+    rms_mm : float
+        Weighted RMS residual.
+    normal : ndarray, shape (4, 4)
+        Normal matrix of centre and radius.
+    core_hu, outside_hu : float
+        Median inside, half-sample mode of the shell outside.
+    cut : ndarray of bool, shape (DIRECTIONS,)
+        Directions left out as rod or metal.
+    cut_share, edge_share : float
+        Shares of all directions cut as rod or metal, and of the remaining ones with a sound edge.
+    shell_hu : ndarray, shape (DIRECTIONS,)
+        Mean brightness outside the ball.
+    core_noise_hu : float
+        Robust standard deviation of the HU inside.
+    """
+
+    center_mm: NDArray[np.float64]
+    radius_mm: float
+    residual_mm: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    rms_mm: float
+    normal: NDArray[np.float64]
+    core_hu: float
+    outside_hu: float
+    cut: NDArray[np.bool_]
+    cut_share: float
+    edge_share: float
+    shell_hu: NDArray[np.float64]
+    core_noise_hu: float
+
+
+def half_sample_mode(values: NDArray[np.float64]) -> float:
+    """The mode by halving: the densest half again and again."""
+    data = np.sort(np.asarray(values, float).ravel())
+    while len(data) > 3:
+        half = (len(data) + 1) // 2
+        width = data[half - 1 :] - data[: len(data) - half + 1]
+        start = int(np.argmin(width))
+        data = data[start : start + half]
+    return float(data.mean())
+
+
+def fit_rays(crop: Crop, start_mm: NDArray[np.float64], radius_mm: float) -> RayFit | None:
+    """Fit a sphere of about the given radius; None when too few rays have an edge.
+
+    Parameters
+    ----------
+    crop : Crop
+    start_mm : ndarray, shape (3,)
+        Centre to about a voxel, LPS mm.
+    radius_mm : float
+        Nominal radius.
+    """
+    center = np.asarray(start_mm, float)
+    fit = None
+    for _ in range(3):
+        fit = _one_pass(crop, center, radius_mm)
+        if fit is None:
+            return None
+        moved = float(np.linalg.norm(fit.center_mm - center))
+        center = fit.center_mm
+        if moved < 0.02:
+            break
+    return fit
+
+
+def _one_pass(crop: Crop, center: NDArray[np.float64], radius: float) -> RayFit | None:
+    directions = sphere_directions(DIRECTIONS)
+    distance = np.arange(max(0.3 * radius, radius - 2.6), radius + 3.21, STEP_MM)
+    profile = crop.sample(center + directions[:, None, :] * distance[:, None])
+    core = profile[:, distance < max(0.55 * radius, distance[0] + STEP_MM)]
+    core_hu = float(np.median(core))
+    shell = profile[:, distance > radius + 1.8].mean(axis=1)
+    outside = half_sample_mode(shell)
+    smooth = neighbour_average(DIRECTIONS, SMOOTH_RAD) @ profile
+    reach, strength = _steepest(smooth, distance, radius)
+    cut = _bright_side(shell, outside, core_hu)
+    sound = np.isfinite(reach) & (strength >= WEAK_SHARE * np.median(strength))
+    usable = sound & ~cut
+    if usable.sum() < 0.2 * DIRECTIONS:
+        return None
+    solution = _sphere(center, directions, reach, usable)
+    if solution is None:
+        return None
+    new_center, size, residual, weight, normal = solution
+    rms = float(np.sqrt(np.sum(weight * residual**2) / np.sum(weight)))
+    return RayFit(
+        center_mm=new_center,
+        radius_mm=size,
+        residual_mm=np.where(usable, residual, np.nan),
+        weight=weight,
+        rms_mm=rms,
+        normal=normal,
+        core_hu=core_hu,
+        outside_hu=outside,
+        cut=cut,
+        cut_share=float(cut.mean()),
+        edge_share=float((weight > 0).sum() / max(1, (~cut).sum())),
+        shell_hu=shell,
+        core_noise_hu=float(1.4826 * np.median(np.abs(core - core_hu))),
+    )
+
+
+def _steepest(
+    profile: NDArray[np.float64], distance: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance and strength of the steepest fall along each ray, NaN where there is none."""
+    offsets = np.arange(-4, 5) * STEP_MM
+    kernel = offsets * np.exp(-0.5 * (offsets / SMOOTH_MM) ** 2)
+    kernel /= -np.sum(kernel * offsets)
+    windows = np.lib.stride_tricks.sliding_window_view(profile, len(kernel), axis=1)
+    fall = windows @ kernel
+    place = distance[4 : 4 + fall.shape[1]]
+    inside = np.abs(place - radius) <= WINDOW_MM
+    fall, place = fall[:, inside], place[inside]
+    best = np.argmax(fall, axis=1)
+    inner = np.clip(best, 1, fall.shape[1] - 2)
+    rows = np.arange(len(fall))
+    left, mid, right = fall[rows, inner - 1], fall[rows, inner], fall[rows, inner + 1]
+    bend = left - 2 * mid + right
+    shift = np.where(bend < 0, 0.5 * (left - right) / np.where(bend < 0, bend, -1.0), 0.0)
+    reach = place[inner] + np.clip(shift, -1, 1) * STEP_MM
+    strength = np.maximum(fall[rows, best], 0.0)
+    return np.where((best == inner) & (strength > 0), reach, np.nan), strength
+
+
+def _bright_side(shell: NDArray[np.float64], outside: float, core_hu: float) -> NDArray[np.bool_]:
+    """Directions of the rod or of metal, widened to a margin, and their antipodes."""
+    directions = sphere_directions(DIRECTIONS)
+    mild = neighbour_average(DIRECTIONS, 0.12) @ shell
+    noise = 1.4826 * float(np.median(np.abs(mild - np.median(mild))))
+    limit = outside + max(4.0 * noise, 0.02 * (core_hu - outside))
+    bright = mild > limit
+    if bright.mean() > 0.35:
+        bright = mild > outside + 0.4 * (core_hu - outside)
+    if not bright.any():
+        return np.zeros(DIRECTIONS, bool)
+    wide = (directions @ directions[bright].T).max(axis=1) > np.cos(np.radians(10.0))
+    both = wide | np.roll(wide, DIRECTIONS // 2)
+    return both if 1.0 - both.mean() >= FEW_LEFT else wide
+
+
+def _sphere(
+    center: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    reach: NDArray[np.float64],
+    usable: NDArray[np.bool_],
+) -> tuple[NDArray, float, NDArray, NDArray, NDArray] | None:
+    """Geometric sphere fit with Tukey weights: centre, radius, residuals, weights, normal."""
+    points = np.where(usable, reach, 0.0)[:, None] * directions
+    shift, size = np.zeros(3), float(np.median(reach[usable]))
+    weight = usable.astype(float)
+    residual = np.zeros(len(points))
+    normal = np.eye(4)
+    for _ in range(12):
+        away = points - shift
+        length = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+        residual = np.where(usable, length - size, 0.0)
+        scale = 1.4826 * float(np.median(np.abs(residual[usable]))) + 1e-4
+        weight = usable * np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
+        rows = np.column_stack([away / length[:, None], np.ones(len(points))])
+        normal = rows.T @ (weight[:, None] * rows)
+        if np.linalg.cond(normal) > 1e8:
+            return None
+        change = np.linalg.solve(normal, rows.T @ (weight * residual))
+        shift, size = shift + change[:3], size + float(change[3])
+        if np.abs(change).max() < 1e-5:
+            break
+    return center + shift, size, residual, weight, normal
