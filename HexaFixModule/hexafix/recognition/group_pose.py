@@ -69,9 +69,9 @@ def ring_pose_by_groups(
     points = checked_points(points_mm, layout)
     refuse_mirrored(points, layout)
     rotation, position = ring_poses_by_groups(points, layout)
-    total = total_covariances(
-        points[None], rotation[None], covariances_mm2, installation_sigma_mm
-    )[0]
+    total = total_covariances(points[None], rotation[None], covariances_mm2, installation_sigma_mm)[
+        0
+    ]
     jacobian = group_jacobian(layout)
     covariance = np.einsum("ani,nij,bnj->ab", jacobian, total, jacobian)
     e = (points - position) @ rotation - layout.points_mm

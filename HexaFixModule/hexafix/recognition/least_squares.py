@@ -117,6 +117,7 @@ def ring_poses(
     points = np.asarray(points_mm, float)
     r = layout.points_mm
     rotation, position = kabsch(points_mm=points, layout_mm=r)
+    step = np.zeros((len(points), 6))
     for _ in range(MAX_STEPS):
         total = total_covariances(points, rotation, covariances_mm2, installation_sigma_mm)
         normal, gradient, chi2 = _normal_equations(points, r, total, rotation, position)
@@ -228,7 +229,12 @@ def ring_pose(
         installation_sigma_mm=installation_sigma_mm,
     )
     return ring_pose_value(
-        points, layout, Pose(rotation[0], position[0]), covariance[0], float(chi2[0]), "least-squares"
+        points,
+        layout,
+        Pose(rotation[0], position[0]),
+        covariance[0],
+        float(chi2[0]),
+        "least-squares",
     )
 
 

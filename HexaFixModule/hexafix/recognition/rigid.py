@@ -75,9 +75,7 @@ def triangle_heights_mm(corners_mm: ArrayLike) -> Array:
     sides = corners - np.roll(corners, 1, axis=-2)
     double_area = np.linalg.norm(np.cross(sides[..., 0, :], sides[..., 1, :]), axis=-1)
     longest = np.linalg.norm(sides, axis=-1).max(axis=-1)
-    return np.divide(
-        double_area, longest, out=np.zeros_like(double_area), where=longest > 0.0
-    )
+    return np.divide(double_area, longest, out=np.zeros_like(double_area), where=longest > 0.0)
 
 
 def best_triangle_height_mm(points_mm: ArrayLike) -> float:
