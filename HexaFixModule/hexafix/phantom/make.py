@@ -1,0 +1,127 @@
+"""From a spec to a phantom: voxels, truth and case."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+from hexafix.errors import Fault, InputError
+from hexafix.imaging import ImageSource, Volume
+from hexafix.phantom.balls import ExactBall
+from hexafix.phantom.decoys import decoys_of
+from hexafix.phantom.hardware import frame_solids
+from hexafix.phantom.limb import limb_solids
+from hexafix.phantom.render import render
+from hexafix.phantom.scene import Scene, build_scene
+from hexafix.phantom.spec import PhantomSpec
+from hexafix.phantom.streaks import streaks_of
+from hexafix.phantom.truth import case_document, truth_document
+from hexafix.progress import Progress, silent
+
+
+@dataclass(frozen=True, eq=False)
+class Phantom:
+    """A synthetic CT with its exact truth.
+
+    Attributes
+    ----------
+    spec : PhantomSpec
+    volume : Volume
+        int16 HU.
+    truth : dict
+        JSON-able: ball centres by number, ring matrices, mechanism pose, struts, decoys,
+        fracture, and what the correction should reach; LPS mm.
+    case : dict
+        JSON-able case document of the contract's schema; `image.path` is ``ct``.
+    """
+
+    spec: PhantomSpec
+    volume: Volume
+    truth: dict[str, Any]
+    case: dict[str, Any]
+
+
+def make_phantom(
+    spec: PhantomSpec | None = None, *, progress: Progress = silent, workers: int | None = None
+) -> Phantom:
+    """A synthetic CT of a fixator on a limb.
+
+    Parameters
+    ----------
+    spec : PhantomSpec or None
+        None: the default one.
+    progress : Progress
+    workers : int or None
+        Threads, None: as many as there are cores; the result does not depend on it.
+
+    Raises
+    ------
+    InputError
+        If a strut of the pose leaves its stroke or a ball lies outside the volume.
+    """
+    spec = spec or PhantomSpec()
+    scene = build_scene(spec)
+    loose, other_balls, listed = decoys_of(spec, scene)
+    truth = truth_document(spec, scene, listed)
+    _check(spec, scene, truth)
+    solids = limb_solids(spec, scene) + frame_solids(spec, scene) + loose
+    balls = other_balls + [
+        ExactBall(center, spec.ball_diameter_mm / 2.0, spec.ball_hu)
+        for center in scene.balls_mm.values()
+    ]
+    voxels = render(
+        spec,
+        scene.grid,
+        solids,
+        balls,
+        streaks_of(spec, scene),
+        progress=progress,
+        workers=workers,
+    )
+    digest = hashlib.sha256(scene.grid.ijk_to_lps.tobytes())
+    digest.update(voxels)
+    source = ImageSource(
+        kind="memory",
+        sha256=digest.hexdigest(),
+        slice_thickness_mm=spec.thickness_mm,
+        laterality=spec.side[0].upper(),
+        body_part=BODY_PART.get(spec.bone, "EXTREMITY"),
+        patient_position="HFS",
+    )
+    volume = Volume(voxels, scene.grid.ijk_to_lps, source)
+    return Phantom(spec, volume, truth, case_document(spec, scene, "ct"))
+
+
+BODY_PART = {"tibia": "LEG", "femur": "LEG", "humerus": "ARM", "forearm": "ARM", "foot": "FOOT"}
+"""BodyPartExamined by bone."""
+
+
+def _check(spec: PhantomSpec, scene: Scene, truth: dict[str, Any]) -> None:
+    """Refuse a frame that could not be built or that the scan would miss."""
+    faults = []
+    stroke = spec.fixator.strut
+    for number, length in enumerate(scene.strut_lengths_mm, start=1):
+        if not stroke.min_mm <= length <= stroke.max_mm:
+            faults.append(
+                Fault(
+                    "phantom-strut",
+                    f"strut {number} of this mechanism pose leaves its stroke",
+                    f"{length:.2f} mm",
+                    f"{stroke.min_mm} to {stroke.max_mm} mm",
+                    "choose another mechanism pose",
+                )
+            )
+    for ball in truth["balls"]:
+        if not spec.partial_frame and not ball["whole_in_image"]:
+            faults.append(
+                Fault(
+                    "phantom-ball-outside",
+                    f"ball {ball['number']} does not lie wholly in the volume",
+                    str([round(c, 1) for c in ball["center_mm"]]) + " mm LPS",
+                    "inside, with its blur",
+                    "choose more or larger voxels, or ask for a partial frame",
+                )
+            )
+    if faults:
+        raise InputError(*faults)
