@@ -1,0 +1,362 @@
+"""The header of one DICOM file: what the geometry, the grey values and the choice of series need.
+
+Only the attributes listed here are ever looked at; nothing that names a patient is read.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+from pydicom import dcmread
+from pydicom.dataset import Dataset, FileDataset
+from pydicom.errors import InvalidDicomError
+from pydicom.tag import Tag
+
+IMPLICIT_LITTLE = "1.2.840.10008.1.2"
+EXPLICIT_LITTLE = "1.2.840.10008.1.2.1"
+EXPLICIT_BIG = "1.2.840.10008.1.2.2"
+DEFLATED = "1.2.840.10008.1.2.1.99"
+PLAIN_SYNTAXES = frozenset({IMPLICIT_LITTLE, EXPLICIT_LITTLE, EXPLICIT_BIG})
+MEDIA_DIRECTORY = "1.2.840.10008.1.3.10"
+
+_KEYWORDS = (
+    *("ImageType", "Modality", "SOPClassUID", "SOPInstanceUID", "SeriesInstanceUID"),
+    *("FrameOfReferenceUID", "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing"),
+    *("SliceThickness", "PatientPosition", "BodyPartExamined", "Laterality", "ImageLaterality"),
+    *("Rows", "Columns", "NumberOfFrames", "SamplesPerPixel", "BitsAllocated", "BitsStored"),
+    *("HighBit", "PixelRepresentation", "PixelPaddingValue", "PixelPaddingRangeLimit"),
+    *("RescaleSlope", "RescaleIntercept", "RescaleType", "ModalityLUTSequence"),
+    *("LossyImageCompression", "SharedFunctionalGroupsSequence"),
+    "PerFrameFunctionalGroupsSequence",
+)
+_TAGS = [Tag(keyword) for keyword in _KEYWORDS]
+_TAG = dict(zip(_KEYWORDS, _TAGS, strict=True))
+_PIXEL_DATA = 0x7FE00010
+_PIXEL_TAGS = (_PIXEL_DATA, 0x7FE00008, 0x7FE00009)
+_UNDEFINED = 0xFFFFFFFF
+# A deflated header can blow up a thousandfold; no CT slice or multi-frame CT needs more than this.
+_MAX_INFLATED = 1 << 30
+
+
+class NotAnImage(Exception):
+    """The file holds no image slice; the text is the reason shown to the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class PixelFormat:
+    """How the pixels of a file are stored and become Hounsfield units.
+
+    Attributes
+    ----------
+    transfer_syntax : str
+    bits_allocated, bits_stored, high_bit, samples : int
+    signed : bool
+    padding, padding_limit : int or None
+        PixelPaddingValue and PixelPaddingRangeLimit, reduced to `bits_allocated` bits.
+    offset, length : int or None
+        Where the pixel bytes lie in the file; length None when they are encapsulated, both None
+        when there are no pixels or the whole file is deflated.
+    available : int
+        Bytes present from `offset` to the end of the file.
+    """
+
+    transfer_syntax: str
+    bits_allocated: int
+    bits_stored: int
+    high_bit: int
+    signed: bool
+    samples: int
+    padding: int | None
+    padding_limit: int | None
+    offset: int | None
+    length: int | None
+    available: int
+
+
+@dataclass(frozen=True, slots=True)
+class SliceHeader:
+    """One image slice: a file, or one frame of a multi-frame file.
+
+    Attributes
+    ----------
+    path : Path
+    frame, frames : int
+        Index of the frame and number of frames in the file.
+    position_mm : tuple of 3 floats or None
+        ImagePositionPatient, LPS, mm.
+    orientation : tuple of 6 floats or None
+        ImageOrientationPatient: direction along a row, then along a column.
+    pixel_spacing_mm : tuple of 2 floats or None
+        PixelSpacing: between rows (along j) first, then between columns (along i).
+    slope, intercept : float or None
+        Rescale to HU.
+    """
+
+    path: Path
+    frame: int
+    frames: int
+    series_uid: str
+    frame_of_reference: str
+    sop_uid: str
+    sop_class: str
+    modality: str
+    image_type: tuple[str, ...]
+    rows: int
+    columns: int
+    position_mm: tuple[float, ...] | None
+    orientation: tuple[float, ...] | None
+    pixel_spacing_mm: tuple[float, ...] | None
+    slope: float | None
+    intercept: float | None
+    rescale_type: str | None
+    modality_lut: bool
+    lossy: bool
+    thickness_mm: float | None
+    laterality: str | None
+    body_part: str | None
+    patient_position: str | None
+    pixels: PixelFormat
+
+
+def read_headers(path: Path) -> list[SliceHeader]:
+    """Headers of all frames of one DICOM file.
+
+    Raises
+    ------
+    NotAnImage
+        If the file is not DICOM, cannot be parsed or holds no image; the text has the reason.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(132)
+            if len(head) == 0:
+                raise NotAnImage("empty file")
+            if head[128:] != b"DICM":
+                raise NotAnImage("not DICOM (no preamble)")
+            file.seek(0)
+            return _parse(path, file)
+    except OSError as error:
+        # pydicom raises OSError too, with the tag it wanted: only our wording goes out.
+        reason = "DICOM header ends early or is corrupt"
+        raise NotAnImage("file cannot be opened" if error.errno else reason) from None
+    except (InvalidDicomError, zlib.error):
+        raise NotAnImage("DICOM header ends early or is corrupt") from None
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError, LookupError) as error:
+        raise NotAnImage("DICOM header is corrupt") from error
+    except (struct.error, OverflowError, NotImplementedError, RecursionError, MemoryError) as error:
+        raise NotAnImage("DICOM header is corrupt") from error
+
+
+def _parse(path: Path, file: BinaryIO) -> list[SliceHeader]:
+    size = path.stat().st_size
+    if DEFLATED.encode() in file.read(1024):
+        _check_inflated_size(file)
+    file.seek(0)
+    dataset = dcmread(file, stop_before_pixels=True, specific_tags=_TAGS)
+    syntax = str(dataset.file_meta.get("TransferSyntaxUID", "") or "")
+    if not syntax:
+        raise NotAnImage("DICOM without a transfer syntax")
+    if dataset.file_meta.get("MediaStorageSOPClassUID") == MEDIA_DIRECTORY:
+        raise NotAnImage("DICOM media directory")
+    if syntax == DEFLATED:
+        offset, length = None, None
+    else:
+        offset, length = _locate_pixels(file, dataset)
+    rows, columns = _integer(dataset, "Rows"), _integer(dataset, "Columns")
+    if not rows or not columns:
+        raise NotAnImage("DICOM object without an image")
+    frames = int(_text(dataset, "NumberOfFrames") or 1)
+    if frames < 1:
+        raise NotAnImage("DICOM header is corrupt")
+    bits = _integer(dataset, "BitsAllocated") or 0
+    stored = _integer(dataset, "BitsStored") or bits
+    high = _integer(dataset, "HighBit")
+    pixels = PixelFormat(
+        transfer_syntax=syntax,
+        bits_allocated=bits,
+        bits_stored=stored,
+        high_bit=stored - 1 if high is None else high,
+        signed=_integer(dataset, "PixelRepresentation") == 1,
+        samples=_integer(dataset, "SamplesPerPixel") or 1,
+        padding=_integer(dataset, "PixelPaddingValue"),
+        padding_limit=_integer(dataset, "PixelPaddingRangeLimit"),
+        offset=offset,
+        length=length,
+        available=0 if offset is None else size - offset,
+    )
+    common = _common(dataset, path, frames, rows, columns, pixels)
+    return _frames(dataset, common, frames)
+
+
+def _check_inflated_size(file: BinaryIO) -> None:
+    """Refuse a deflated data set that inflates beyond reason, in bounded memory."""
+    file.seek(0)
+    raw = file.read()
+    # Group length (0002,0000) UL stands first in the meta header: it says where the data begin.
+    meta_length = struct.unpack_from("<L", raw, 140)[0] if raw[132:136] == b"\2\0\0\0" else 0
+    inflater = zlib.decompressobj(-zlib.MAX_WBITS)
+    total, data = 0, raw[144 + meta_length :]
+    while data and not inflater.eof:
+        total += len(inflater.decompress(data, 1 << 20))
+        data = inflater.unconsumed_tail
+        if total > _MAX_INFLATED:
+            raise NotAnImage("deflated DICOM that inflates to more than 1 GB")
+
+
+def _locate_pixels(file: BinaryIO, dataset: FileDataset) -> tuple[int | None, int | None]:
+    """Offset and length of the pixel bytes; the file stands at their element after the parse."""
+    start = file.tell()
+    head = file.read(12)
+    little = bool(dataset.original_encoding[1])
+    order = "<" if little else ">"
+    if len(head) < 8:
+        return None, None
+    group, element = struct.unpack_from(order + "HH", head)
+    if (group << 16 | element) not in _PIXEL_TAGS:
+        return None, None
+    if dataset.original_encoding[0]:
+        length, data = struct.unpack_from(order + "L", head, 4)[0], start + 8
+    elif len(head) == 12:
+        length, data = struct.unpack_from(order + "L", head, 8)[0], start + 12
+    else:
+        return None, None
+    return data, None if length == _UNDEFINED else length
+
+
+def _raw(dataset: Dataset, keyword: str) -> Any:
+    """The element's value; raw bytes where pydicom has not converted it, None where absent."""
+    tag = _TAG[keyword]
+    if tag not in dataset:
+        return None
+    return cast(Any, dataset.get_item(tag)).value
+
+
+def _text(dataset: Dataset, keyword: str) -> str | None:
+    """A string attribute, None where absent or empty.
+
+    Read from the raw bytes: code strings, decimals and UIDs are ASCII, and pydicom's conversion of
+    each would cost more than the whole rest of the header.
+    """
+    value = _raw(dataset, keyword)
+    if value is None:
+        return None
+    if isinstance(value, bytes):
+        text = value.decode("ascii", "replace")
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        text = "\\".join(str(item) for item in value)
+    else:
+        text = str(value)
+    return text.strip(" \0") or None
+
+
+def _numbers(dataset: Dataset, keyword: str, count: int) -> tuple[float, ...] | None:
+    """`count` finite decimals, None where the attribute is absent, incomplete or not a number."""
+    text = _text(dataset, keyword)
+    if text is None:
+        return None
+    try:
+        values = tuple(float(part) for part in text.split("\\"))
+    except ValueError:
+        return None
+    return values if len(values) == count and all(map(math.isfinite, values)) else None
+
+
+def _number(dataset: Dataset, keyword: str) -> float | None:
+    values = _numbers(dataset, keyword, 1)
+    return values[0] if values else None
+
+
+def _integer(dataset: Dataset, keyword: str) -> int | None:
+    """A US or SS attribute as its unsigned bit pattern."""
+    tag = _TAG[keyword]
+    if tag not in dataset:
+        return None
+    element = cast(Any, dataset.get_item(tag))
+    if isinstance(element.value, bytes):
+        if not element.value:
+            return None
+        order = "little" if element.is_little_endian else "big"
+        return int.from_bytes(element.value[:2], order)
+    return None if element.value is None else int(element.value)
+
+
+def _common(
+    dataset: FileDataset, path: Path, frames: int, rows: int, columns: int, pixels: PixelFormat
+) -> dict[str, Any]:
+    """The fields of `SliceHeader` as the top level of the data set gives them."""
+    lossy_flag = _text(dataset, "LossyImageCompression")
+    return {
+        "path": path,
+        "frames": frames,
+        "series_uid": _text(dataset, "SeriesInstanceUID") or "",
+        "frame_of_reference": _text(dataset, "FrameOfReferenceUID") or "",
+        "sop_uid": _text(dataset, "SOPInstanceUID") or "",
+        "sop_class": _text(dataset, "SOPClassUID") or "",
+        "modality": _text(dataset, "Modality") or "",
+        "image_type": tuple(
+            part.strip() for part in (_text(dataset, "ImageType") or "").split("\\")
+        ),
+        "rows": rows,
+        "columns": columns,
+        "position_mm": _numbers(dataset, "ImagePositionPatient", 3),
+        "orientation": _numbers(dataset, "ImageOrientationPatient", 6),
+        "pixel_spacing_mm": _numbers(dataset, "PixelSpacing", 2),
+        "slope": _number(dataset, "RescaleSlope"),
+        "intercept": _number(dataset, "RescaleIntercept"),
+        "rescale_type": _text(dataset, "RescaleType"),
+        "modality_lut": _TAG["ModalityLUTSequence"] in dataset,
+        "lossy": lossy_flag == "01",
+        "thickness_mm": _number(dataset, "SliceThickness"),
+        "laterality": _text(dataset, "ImageLaterality") or _text(dataset, "Laterality"),
+        "body_part": _text(dataset, "BodyPartExamined"),
+        "patient_position": _text(dataset, "PatientPosition"),
+        "pixels": pixels,
+    }
+
+
+def _frames(dataset: FileDataset, common: dict[str, Any], frames: int) -> list[SliceHeader]:
+    if _TAG["PerFrameFunctionalGroupsSequence"] not in dataset:
+        if frames > 1:
+            # One position at the top level cannot place several frames.
+            common |= {"position_mm": None}
+        return [SliceHeader(frame=index, **common) for index in range(frames)]
+    per_frame = list(dataset.PerFrameFunctionalGroupsSequence)
+    shared = list(dataset.get("SharedFunctionalGroupsSequence") or [])
+    if len(per_frame) != frames:
+        raise NotAnImage("multi-frame DICOM whose functional groups do not match its frames")
+    return [
+        SliceHeader(frame=index, **(common | _functional_groups([item, *shared])))
+        for index, item in enumerate(per_frame)
+    ]
+
+
+def _functional_groups(groups: list[Dataset]) -> dict[str, Any]:
+    """Geometry and rescale of one frame: its own functional group wins over the shared one."""
+
+    def find(macro: str) -> Dataset:
+        for group in groups:
+            items = group.get(macro)
+            if items:
+                return items[0]
+        return Dataset()
+
+    measures, transform = find("PixelMeasuresSequence"), find("PixelValueTransformationSequence")
+    found: dict[str, Any] = {
+        "position_mm": _numbers(find("PlanePositionSequence"), "ImagePositionPatient", 3),
+        "orientation": _numbers(find("PlaneOrientationSequence"), "ImageOrientationPatient", 6),
+        "pixel_spacing_mm": _numbers(measures, "PixelSpacing", 2),
+        "slope": _number(transform, "RescaleSlope"),
+        "intercept": _number(transform, "RescaleIntercept"),
+        "rescale_type": _text(transform, "RescaleType"),
+        "thickness_mm": _number(measures, "SliceThickness"),
+    }
+    anatomy = find("FrameAnatomySequence").get("FrameLaterality")
+    if anatomy:
+        found["laterality"] = str(anatomy)
+    return found

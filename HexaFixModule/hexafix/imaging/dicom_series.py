@@ -1,0 +1,250 @@
+"""Which series lie in a folder, and the one that is read."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hexafix.errors import Fault, ImageRefused, InputError
+from hexafix.imaging.dicom_header import NotAnImage, SliceHeader, read_headers
+from hexafix.imaging.slice_stack import arrange
+from hexafix.progress import Progress, silent
+
+SECONDARY_CAPTURE = "1.2.840.10008.5.1.4.1.1.7"
+_SCOUT_WORDS = {"LOCALIZER", "SCOUT", "TOPOGRAM", "SURVIEW"}
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesSummary:
+    """One series of a folder, for the user's choice; nothing in it names a patient.
+
+    Attributes
+    ----------
+    series_instance_uid, modality : str
+    image_type : tuple of str
+    slices : int
+        Number of slices (frames) that would be read.
+    size_ij : tuple of int
+        Columns and rows.
+    spacing_mm : tuple of float or None
+        Between columns, between rows, between slices; None where the header lacks it.
+    orientation : str
+        ``axial``, ``coronal``, ``sagittal``, ``oblique`` or ``unknown``.
+    excluded : str or None
+        Why the series can never be the volume (localizer, secondary capture, ...).
+    faults : tuple of Fault
+        What would make reading it be refused, as far as headers tell.
+    """
+
+    series_instance_uid: str
+    modality: str
+    image_type: tuple[str, ...]
+    slices: int
+    size_ij: tuple[int, int]
+    spacing_mm: tuple[float, float, float] | None
+    orientation: str
+    excluded: str | None
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def description(self) -> str:
+        """One line for people."""
+        spacing = "no spacing"
+        if self.spacing_mm:
+            spacing = " x ".join(f"{value:.3f}" for value in self.spacing_mm) + " mm"
+        text = (
+            f"{self.modality or 'no modality'}, {self.slices} slices of "
+            f"{self.size_ij[0]} x {self.size_ij[1]}, {spacing}, {self.orientation}"
+        )
+        return text + (f", left out: {self.excluded}" if self.excluded else "")
+
+
+@dataclass(frozen=True)
+class DicomFolder:
+    """All slices below a folder and how many files were passed over, by reason."""
+
+    slices: tuple[SliceHeader, ...]
+    skipped: dict[str, int]
+
+
+def scan(path: Path, progress: Progress = silent) -> DicomFolder:
+    """Headers of every DICOM slice in a file or below a folder, in no meaningful order."""
+    files = [path] if path.is_file() else list(_files(path))
+    slices: list[SliceHeader] = []
+    skipped: Counter[str] = Counter()
+    with warnings.catch_warnings():
+        # pydicom quotes header values in its warnings, and those may name the patient.
+        warnings.simplefilter("ignore")
+        for index, file in enumerate(files):
+            if index % 32 == 0:
+                progress("read DICOM headers", index / len(files))
+            try:
+                slices += read_headers(file)
+            except NotAnImage as reason:
+                skipped[str(reason)] += 1
+    progress("read DICOM headers", 1.0)
+    return DicomFolder(tuple(slices), dict(skipped))
+
+
+def _files(folder: Path) -> Iterable[Path]:
+    def fail(error: OSError) -> None:
+        raise InputError.of(
+            "unreadable-folder",
+            "the image folder or a folder in it cannot be read",
+            value=error.strerror,
+            next_step="check the path and its access rights",
+        )
+
+    for root, folders, names in os.walk(folder, onerror=fail):
+        folders.sort()
+        yield from (Path(root, name) for name in sorted(names))
+
+
+def exclusion(item: SliceHeader) -> str | None:
+    """Why a slice can never belong to the volume, None for an ordinary slice."""
+    if _SCOUT_WORDS & {word.upper() for word in item.image_type[2:]}:
+        return "localizer"
+    if item.sop_class.startswith(SECONDARY_CAPTURE):
+        return "secondary capture"
+    if item.pixels.samples != 1:
+        return "colour image"
+    return None
+
+
+def list_series(folder: str | Path) -> tuple[SeriesSummary, ...]:
+    """Every series below a folder, for the choice; series left out come with their reason.
+
+    Parameters
+    ----------
+    folder : str or Path
+
+    Returns
+    -------
+    tuple of SeriesSummary
+        Usable series first, then by number of slices, descending.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be read.
+    """
+    return summarise(scan(require_path(Path(folder))).slices)
+
+
+def require_path(path: Path) -> Path:
+    """The path itself; refused if nothing is there."""
+    if not path.exists():
+        raise InputError.of(
+            "image-not-found",
+            "the image file or folder does not exist",
+            where=path.name,
+            next_step="check image.path, relative to the case file",
+        )
+    return path
+
+
+def summarise(slices: Iterable[SliceHeader]) -> tuple[SeriesSummary, ...]:
+    """Summaries of the series that the slices belong to."""
+    groups: dict[tuple[str, str | None], list[SliceHeader]] = {}
+    for item in slices:
+        groups.setdefault((item.series_uid, exclusion(item)), []).append(item)
+    summaries = [_summary(reason, items) for (_, reason), items in groups.items()]
+    summaries.sort(key=lambda s: (s.excluded is not None, -s.slices, s.series_instance_uid))
+    return tuple(summaries)
+
+
+def _summary(excluded: str | None, items: list[SliceHeader]) -> SeriesSummary:
+    first = items[0]
+    stack, faults = arrange(items)
+    spacing, orientation = None, "unknown"
+    if stack is not None:
+        i, j, k = np.linalg.norm(stack.ijk_to_lps[:3, :3], axis=0)
+        spacing = (float(i), float(j), float(k))
+        normal = np.abs(stack.axes[2])
+        names = ("sagittal", "coronal", "axial")
+        orientation = names[int(normal.argmax())] if normal.max() > 0.999 else "oblique"
+    return SeriesSummary(
+        series_instance_uid=first.series_uid,
+        modality=first.modality,
+        image_type=first.image_type,
+        slices=len(items),
+        size_ij=(first.columns, first.rows),
+        spacing_mm=spacing,
+        orientation=orientation,
+        excluded=excluded,
+        faults=tuple(faults),
+    )
+
+
+def choose(folder: DicomFolder, series_instance_uid: str | None) -> list[SliceHeader]:
+    """The slices of the one series to read.
+
+    Raises
+    ------
+    InputError
+        If there is no DICOM image, or none of the series asked for.
+    ImageRefused
+        If several series could be meant and none was asked for, or none can be used.
+    """
+    if not folder.slices:
+        reasons = ", ".join(f"{count} x {why}" for why, count in sorted(folder.skipped.items()))
+        raise InputError.of(
+            "no-dicom-image",
+            "no DICOM image was found",
+            value=reasons or "no files",
+            next_step="give the folder that holds the CT slices",
+        )
+    usable = [item for item in folder.slices if exclusion(item) is None]
+    if not usable:
+        raise ImageRefused(*_nothing_usable(folder))
+    uids = sorted({item.series_uid for item in usable})
+    if series_instance_uid is None:
+        if len(uids) > 1:
+            raise ImageRefused(_ambiguous(folder))
+        series_instance_uid = uids[0]
+    chosen = [item for item in usable if item.series_uid == series_instance_uid]
+    if not chosen:
+        raise InputError.of(
+            "series-not-found",
+            "the folder does not hold the series asked for as a usable image",
+            value=f"{len(uids)} other series",
+            where="image.series_instance_uid",
+            next_step="list the folder's series and choose one of them",
+        )
+    return chosen
+
+
+def _nothing_usable(folder: DicomFolder) -> list[Fault]:
+    counts = Counter(str(exclusion(item)) for item in folder.slices)
+    faults = [
+        Fault(
+            "no-usable-series",
+            "the folder holds only images that are no CT volume",
+            value=", ".join(f"{count} x {why}" for why, count in sorted(counts.items())),
+            next_step="export the original CT series",
+            hazard="H05",
+        )
+    ]
+    for summary in summarise(folder.slices):
+        faults += [fault for fault in summary.faults if fault.code == "no-geometry"]
+    return faults
+
+
+def _ambiguous(folder: DicomFolder) -> Fault:
+    # The UID is shown because it is what the user has to put into the case file.
+    lines = [f"[{s.series_instance_uid}: {s.description}]" for s in summarise(folder.slices)]
+    return Fault(
+        "several-series",
+        "the folder holds more than one series",
+        value="; ".join(lines),
+        limit="1",
+        where="image.series_instance_uid",
+        next_step="name the SeriesInstanceUID of the series to read",
+        hazard="H05",
+    )

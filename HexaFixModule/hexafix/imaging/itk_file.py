@@ -1,0 +1,200 @@
+"""NRRD, NIfTI and MetaImage: voxels by SimpleITK, geometry checked against our own parsers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexafix.errors import ImageRefused, InputError
+from hexafix.imaging.file_geometry import (
+    CORNER_TOLERANCE_MM,
+    FileGeometry,
+    corners_mm,
+    faults_of_grid,
+)
+from hexafix.imaging.fingerprint import fingerprint
+from hexafix.imaging.metaimage_header import read_metaimage_header
+from hexafix.imaging.nifti_header import read_nifti_header
+from hexafix.imaging.nrrd_header import read_nrrd_header
+from hexafix.imaging.pixel_data import MAX_VOXELS
+from hexafix.imaging.volume import ImageSource, Volume
+from hexafix.progress import Progress
+
+THICK_SLICES_MM = 2.0
+_AIR_SEEN_HU = -900
+_INT16 = np.iinfo(np.int16)
+
+_PARSERS: dict[str, tuple[str, str, Callable[[Path], FileGeometry]]] = {
+    ".nrrd": ("nrrd", "NrrdImageIO", read_nrrd_header),
+    ".nhdr": ("nrrd", "NrrdImageIO", read_nrrd_header),
+    ".nii": ("nifti", "NiftiImageIO", read_nifti_header),
+    ".nii.gz": ("nifti", "NiftiImageIO", read_nifti_header),
+    ".mha": ("metaimage", "MetaImageIO", read_metaimage_header),
+    ".mhd": ("metaimage", "MetaImageIO", read_metaimage_header),
+}
+
+
+def format_of(path: Path) -> str | None:
+    """The suffix by which a file is read here, None for any other file."""
+    name = path.name.lower()
+    return next((suffix for suffix in _PARSERS if name.endswith(suffix)), None)
+
+
+def read_itk_file(path: Path, progress: Progress) -> Volume:
+    """Read one NRRD, NIfTI or MetaImage file; see `hexafix.imaging.read_volume`."""
+    kind, reader, parse = _PARSERS[format_of(path) or ""]
+    progress("read image file", 0.0)
+    try:
+        geometry = parse(path)
+    except OSError as error:
+        raise InputError.of(
+            "unreadable-file",
+            "the image file cannot be read",
+            value=error.strerror,
+            next_step="check the file and its access rights",
+        ) from error
+    where = f"{kind} header"
+    faults = faults_of_grid(geometry, where)
+    if faults:
+        raise ImageRefused(*faults)
+    if np.prod(geometry.size_ijk, dtype=float) > MAX_VOXELS:
+        raise InputError.of(
+            "volume-too-large",
+            "the image has more voxels than any CT of a limb",
+            value=" x ".join(map(str, geometry.size_ijk)),
+            limit=f"{MAX_VOXELS:.2g} voxels",
+            where=where,
+            next_step="crop the CT around the fixator",
+        )
+    array, itk_affine = load_with_itk(path, reader)
+    _refuse_other_geometry(geometry, array, itk_affine, kind)
+    progress("read image file", 0.5)
+    voxels = _hounsfield(array)
+    source = ImageSource(
+        kind=kind,
+        sha256=fingerprint(voxels, geometry.ijk_to_lps),
+        warnings=tuple(_warnings(voxels, geometry)),
+    )
+    progress("read image file", 1.0)
+    return Volume(voxels, geometry.ijk_to_lps, source)
+
+
+def load_with_itk(path: Path, reader: str) -> tuple[NDArray, NDArray[np.float64]]:
+    """Voxels, shape (K, J, I), and voxel-to-LPS affine as SimpleITK sees them.
+
+    The one place where ITK sees a foreign file.
+
+    Raises
+    ------
+    ImageRefused
+        If ITK fails or warns: its warnings are about geometry that it changed (H53).
+    """
+    import SimpleITK as sitk  # noqa: N813  slow to import, and only these formats need it
+
+    heard: list[str] = []
+
+    class Listener(sitk.LoggerBase):
+        def DisplayText(self, t: str) -> None:  # noqa: N802
+            heard.append(t)
+
+        DisplayErrorText = DisplayWarningText = DisplayText
+        DisplayGenericOutputText = DisplayDebugText = DisplayText
+
+    listener = Listener()
+    before: Any = listener.SetAsGlobalITKLogger()
+    try:
+        source = sitk.ImageFileReader()
+        source.SetImageIO(reader)
+        source.SetFileName(str(path))
+        image = source.Execute()
+    except RuntimeError as error:
+        # ITK's text holds the whole path; only the kind of trouble goes out.
+        raise ImageRefused.of(
+            "corrupt-image-file",
+            "SimpleITK cannot read the image file",
+            next_step="store the image again",
+            hazard="H09",
+        ) from error
+    finally:
+        before.SetAsGlobalITKLogger()
+    if heard:
+        raise ImageRefused.of(
+            "reader-warning",
+            "the reader was in doubt about the image file",
+            value=f"{len(heard)} warnings",
+            limit="0",
+            next_step="convert the CT again from DICOM",
+            hazard="H53",
+        )
+    if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
+        raise InputError.of(
+            "not-a-volume",
+            "the image is not one three-dimensional grey-value volume",
+            value=f"{image.GetDimension()} dimensions, "
+            f"{image.GetNumberOfComponentsPerPixel()} components",
+            limit="3 dimensions, 1 component",
+            next_step="store one three-dimensional CT volume",
+        )
+    affine = np.eye(4)
+    affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * np.array(image.GetSpacing())
+    affine[:3, 3] = image.GetOrigin()
+    return sitk.GetArrayFromImage(image), affine
+
+
+def _refuse_other_geometry(
+    geometry: FileGeometry, array: NDArray, itk_affine: NDArray[np.float64], kind: str
+) -> None:
+    """Two roads to one geometry: our parser and ITK must meet at every corner."""
+    if kind != "nifti":
+        # ITK converts the unit of NIfTI only and hands the others' numbers through.
+        itk_affine = itk_affine.copy()
+        itk_affine[:3] *= geometry.unit_mm
+    apart = np.linalg.norm(
+        geometry.corners_mm() - corners_mm(geometry.size_ijk, itk_affine), axis=1
+    )
+    if array.shape[::-1] == geometry.size_ijk and apart.max() <= CORNER_TOLERANCE_MM:
+        return
+    raise ImageRefused.of(
+        "readers-disagree",
+        "two readers place the image differently",
+        value=f"{apart.max():.3f} mm at a corner",
+        limit=f"{CORNER_TOLERANCE_MM:g} mm",
+        next_step="convert the CT again from DICOM",
+        hazard="H08",
+    )
+
+
+def _hounsfield(array: NDArray) -> NDArray:
+    """The values as int16 where that loses nothing, else as float32."""
+    if array.dtype == np.int16:
+        return array
+    low, high = float(array.min()), float(array.max())
+    if not np.isfinite([low, high]).all():
+        raise ImageRefused.of(
+            "not-finite",
+            "the image holds values that are no numbers",
+            next_step="convert the CT again from DICOM",
+            hazard="H55",
+        )
+    if low >= _INT16.min and high <= _INT16.max:
+        short = array.astype(np.int16)
+        if np.array_equal(short, array):
+            return short
+    return array.astype(np.float32)
+
+
+def _warnings(voxels: NDArray, geometry: FileGeometry) -> list[str]:
+    found = []
+    spacing = np.linalg.norm(geometry.ijk_to_lps[:3, :3], axis=0)
+    if spacing.max() > THICK_SLICES_MM:
+        found.append(
+            f"thick slices (spacing {spacing.max():.2f} mm): ball centres are less accurate"
+        )
+    lowest = float(voxels.min())
+    if lowest > _AIR_SEEN_HU:
+        found.append(f"no air (H10): the lowest value is {lowest:.0f} HU")
+    return found

@@ -1,0 +1,109 @@
+"""MetaImage headers: offset, directions, and where the voxels lie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hexafix.errors import ImageRefused, InputError
+from hexafix.imaging.file_geometry import (
+    FileGeometry,
+    detached_fault,
+    outside_folder,
+    refuse_geometry,
+)
+
+_MAX_HEADER = 1 << 16
+_UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
+
+
+def read_metaimage_header(path: Path) -> FileGeometry:
+    """Geometry of a MetaImage file by its own header.
+
+    The world of a MetaImage is LPS by convention of ITK; AnatomicalOrientation names the direction
+    of the axes for people and does not move anything.
+
+    Raises
+    ------
+    InputError
+        If it is no three-dimensional MetaImage file.
+    ImageRefused
+        If position or directions are missing (H07) or the data lie outside its folder (H50).
+    """
+    fields = _fields(path)
+    where = "MetaImage header"
+    data_file = fields.get("elementdatafile", "")
+    if data_file.upper().startswith("LIST"):
+        raise ImageRefused(detached_fault(where))
+    if data_file.upper() != "LOCAL" and outside_folder(path, data_file):
+        raise ImageRefused(detached_fault(where))
+    size = _numbers(fields, ("dimsize",), where)
+    if len(size) != 3:
+        raise InputError.of(
+            "not-a-volume",
+            "the image does not have three dimensions",
+            value=f"{len(size)} dimensions",
+            limit="3",
+            where=where,
+            next_step="store one three-dimensional volume",
+        )
+    spacing = _numbers(fields, ("elementspacing",), where)
+    origin = _numbers(fields, ("offset", "position", "origin"), where)
+    axes = _numbers(fields, ("transformmatrix", "rotation", "orientation"), where)
+    if (len(spacing), len(origin), len(axes)) != (3, 3, 9):
+        raise _broken("offset, spacing or matrix has the wrong length")
+    unit = _UNITS_MM.get(fields.get("distanceunits", "mm").strip().lower())
+    if unit is None:
+        raise ImageRefused(
+            refuse_geometry(
+                "the unit of length is not one that HexaFix knows",
+                where,
+                limit="mm, cm, m or um",
+                hazard="H08",
+            )
+        )
+    affine = np.eye(4)
+    # Each run of three numbers is the direction of one index axis.
+    affine[:3, :3] = np.array(axes).reshape(3, 3).T * np.array(spacing) * unit
+    affine[:3, 3] = np.array(origin) * unit
+    return FileGeometry((int(size[0]), int(size[1]), int(size[2])), affine, unit)
+
+
+def _numbers(fields: dict[str, str], names: tuple[str, ...], where: str) -> list[float]:
+    given = [fields[name] for name in names if name in fields]
+    if not given:
+        raise ImageRefused(refuse_geometry(f"the field {names[0]} is missing", where))
+    if len(set(given)) > 1:
+        raise ImageRefused(refuse_geometry(f"the field {names[0]} contradicts itself", where))
+    try:
+        return [float(part) for part in given[0].split()]
+    except ValueError:
+        raise _broken(names[0]) from None
+
+
+def _fields(path: Path) -> dict[str, str]:
+    with path.open("rb") as file:
+        head = file.read(_MAX_HEADER).decode("latin-1")
+    fields: dict[str, str] = {}
+    for line in head.splitlines():
+        name, found, value = line.partition("=")
+        if not found:
+            break
+        name = name.strip().lower()
+        if name in fields:
+            raise _broken(f"field '{name}' given twice")
+        fields[name] = value.strip()
+        if name == "elementdatafile":
+            return fields
+    raise _broken("no ElementDataFile")
+
+
+def _broken(what: str) -> InputError:
+    return InputError.of(
+        "bad-metaimage",
+        "the MetaImage header cannot be read",
+        value=what,
+        where="MetaImage header",
+        next_step="store the image again",
+    )

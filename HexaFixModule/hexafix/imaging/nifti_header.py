@@ -1,0 +1,148 @@
+"""NIfTI headers: both forms, the units, and whether they agree."""
+
+from __future__ import annotations
+
+import gzip
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexafix.errors import Fault, ImageRefused, InputError
+from hexafix.imaging.file_geometry import (
+    CORNER_TOLERANCE_MM,
+    FileGeometry,
+    corners_mm,
+    refuse_geometry,
+)
+
+_UNITS_MM = {1: 1000.0, 2: 1.0, 3: 1e-3}
+_LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+_WHERE = "NIfTI header"
+
+
+def read_nifti_header(path: Path) -> FileGeometry:
+    """Geometry of a NIfTI-1 file by its own header.
+
+    Raises
+    ------
+    InputError
+        If it is no three-dimensional NIfTI-1 file.
+    ImageRefused
+        If it has no form (H07), or forms that disagree or an unknown unit (H08).
+    """
+    head, order = _header(path)
+    dim = struct.unpack_from(order + "8h", head, 40)
+    size = tuple(dim[1:4])
+    if dim[0] < 3 or any(extra > 1 for extra in dim[4 : dim[0] + 1]) or min(size) < 1:
+        raise InputError.of(
+            "not-a-volume",
+            "the image is not one three-dimensional volume",
+            value=" x ".join(map(str, dim[1 : max(dim[0], 0) + 1])),
+            where=_WHERE,
+            next_step="store one three-dimensional volume",
+        )
+    unit = _UNITS_MM.get(head[123] & 7)
+    if unit is None:
+        raise ImageRefused(
+            refuse_geometry(
+                "the unit of length is not given",
+                _WHERE,
+                value=f"code {head[123] & 7}",
+                limit="metre, millimetre or micrometre",
+                hazard="H08",
+            )
+        )
+    qform_code, sform_code = struct.unpack_from(order + "2h", head, 252)
+    forms = {}
+    if qform_code > 0:
+        forms["qform"] = _qform(head, order)
+    if sform_code > 0:
+        forms["sform"] = _sform(head, order)
+    if not forms:
+        raise ImageRefused(refuse_geometry("neither sform nor qform is given", _WHERE))
+    affines = {name: _LPS_FROM_RAS @ _scaled(form, unit) for name, form in forms.items()}
+    shape = (size[0], size[1], size[2])
+    _refuse_disagreement(affines, shape)
+    return FileGeometry(shape, affines.get("sform", affines.get("qform", np.eye(4))), unit)
+
+
+def _refuse_disagreement(
+    affines: dict[str, NDArray[np.float64]], size_ijk: tuple[int, int, int]
+) -> None:
+    if len(affines) < 2:
+        return
+    s, q = (corners_mm(size_ijk, affines[name]) for name in ("sform", "qform"))
+    apart = float(np.max(np.linalg.norm(s - q, axis=1)))
+    # Written so that a number that is not finite is refused too.
+    if not apart <= CORNER_TOLERANCE_MM:
+        raise ImageRefused(
+            Fault(
+                "forms-disagree",
+                "sform and qform place the image differently",
+                value=f"{apart:.3f} mm at a corner",
+                limit=f"{CORNER_TOLERANCE_MM:g} mm",
+                next_step="convert the CT again from DICOM",
+                hazard="H08",
+                where=_WHERE,
+            )
+        )
+
+
+def _scaled(form: NDArray[np.float64], unit: float) -> NDArray[np.float64]:
+    scaled = form.copy()
+    scaled[:3] *= unit
+    return scaled
+
+
+def _sform(head: bytes, order: str) -> NDArray[np.float64]:
+    rows = np.array(struct.unpack_from(order + "12f", head, 280)).reshape(3, 4)
+    return np.vstack([rows, [0.0, 0.0, 0.0, 1.0]])
+
+
+def _qform(head: bytes, order: str) -> NDArray[np.float64]:
+    """The affine of the unit quaternion; pixdim[0] carries the handedness."""
+    pixdim = struct.unpack_from(order + "8f", head, 76)
+    b, c, d, *offset = struct.unpack_from(order + "6f", head, 256)
+    a = np.sqrt(max(0.0, 1.0 - (b * b + c * c + d * d)))
+    rotation = np.array(
+        [
+            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+            [2 * (b * c + a * d), a * a + c * c - b * b - d * d, 2 * (c * d - a * b)],
+            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a + d * d - c * c - b * b],
+        ]
+    )
+    handed = -1.0 if pixdim[0] < 0 else 1.0
+    form = np.eye(4)
+    form[:3, :3] = rotation * np.array([pixdim[1], pixdim[2], handed * pixdim[3]])
+    form[:3, 3] = offset
+    return form
+
+
+def _header(path: Path) -> tuple[bytes, str]:
+    try:
+        with path.open("rb") as plain:
+            packed = plain.read(2) == b"\x1f\x8b"
+        with gzip.open(path) if packed else path.open("rb") as file:
+            head = file.read(352)
+    except (OSError, EOFError, zlib.error):
+        raise _broken("compressed data are damaged") from None
+    if len(head) >= 348:
+        for order in "<>":
+            if struct.unpack_from(order + "i", head)[0] == 348:
+                if head[344:348] == b"n+1\0":
+                    return head, order
+                raise _broken("only single-file NIfTI-1 is read")
+    raise _broken("header length is not 348")
+
+
+def _broken(what: str) -> InputError:
+    return InputError.of(
+        "bad-nifti",
+        "the NIfTI header cannot be read",
+        value=what,
+        where=_WHERE,
+        next_step="store the image again as .nii or .nii.gz",
+    )
