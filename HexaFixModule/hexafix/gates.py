@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike
 
 from hexafix.errors import Fault, Refused
 from hexafix.geometry import Pose, matrix_from_xyz_fixed
-
-RING_RMS_LIMIT_MM = 0.4
-"""G2: manufacture (0.2 mm, three sigma) and image (≤ 0.05 mm) stay below; +1 % scale gives 0.79."""
+from hexafix.recognition import RING_RMS_LIMIT_MM
 
 DIAMETER_LIMIT_MM = 0.3
 """G3: blur biases the fitted diameter by less; a slice spacing wrong by 4 % gives more."""
@@ -33,8 +31,9 @@ RECOGNITION_LIMIT_MM = 1.5
 RECOGNITION_LIMIT_DEG = 1.0
 """G6: |ΔX_r| beyond which compensation would hide a gross error (H33)."""
 
-NUMBERING_MARGIN_MM = 5.0
-"""G7: RMS by which the best wrong numbering must stand off (H18)."""
+NUMBERING_MARGIN_MM = 0.5
+"""G7: least RMS by which any other choice of balls must stand off; for the same balls under other
+numbers `number_balls` asks for 5 mm before it returns (H18)."""
 
 CONDITION_LIMIT = 100.0
 """G8: condition number of the strut Jacobian (rotations scaled by the joint radius), H31."""

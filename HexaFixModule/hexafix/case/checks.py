@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
+from hexafix.correction.targets import Deformity
 from hexafix.errors import Fault, InputError
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
-
-WORDS = {
-    "ap_angulation_deg": "ap_angulation",
-    "lateral_angulation_deg": "lateral_angulation",
-    "axial_rotation_deg": "axial_rotation",
-    "ap_translation_mm": "ap_translation",
-    "lateral_translation_mm": "lateral_translation",
-    "axial_translation_mm": "axial_translation",
-}
-"""Each clinical parameter and the word that gives its direction."""
 
 
 def marker_faults(markers: dict[str, Any], where: str = "markers") -> Iterator[Fault]:
@@ -108,14 +99,12 @@ def correction_faults(correction: dict[str, Any]) -> Iterator[Fault]:
                 where="correction.fixed_points_lps_mm",
                 next_step="give one fixed point for each moving point",
             )
-    elif kind == "deformity":
-        for amount, word in WORDS.items():
-            if correction.get(amount, 0.0) and correction.get(word) is None:
-                yield Fault(
-                    "direction-missing",
-                    f"{amount} needs its direction in words",
-                    value=f"{correction[amount]:g}",
-                    where=f"correction.{word}",
-                    hazard="H42",
-                    next_step=f"add the key {word}",
-                )
+
+
+def deformity_faults(correction: dict[str, Any], side: Literal["left", "right"]) -> Iterator[Fault]:
+    """Amounts without their direction in words, and amounts that are not plausible."""
+    try:
+        given = {key: value for key, value in correction.items() if key != "kind"}
+        Deformity.of(side=side, **{"moving": "distal", **given})
+    except InputError as error:
+        yield from error.faults

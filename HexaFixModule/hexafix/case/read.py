@@ -6,7 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -25,7 +25,7 @@ from hexafix.correction.targets import (
 from hexafix.errors import Fault, InputError
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, MarkerSite
-from hexafix.hardware.definition import fixator_from_document
+from hexafix.hardware.definition import fixator_from_document, shipped_fixators
 from hexafix.paths import resources
 
 
@@ -116,11 +116,6 @@ def load_layouts(path: Path) -> tuple[MarkerLayout, MarkerLayout]:
     return _layout(model.proximal), _layout(model.distal)
 
 
-def shipped_fixators() -> tuple[str, ...]:
-    """Ids of the definitions that come with HexaFix."""
-    return tuple(sorted(p.stem for p in (resources() / "Hardware" / "Frames").glob("*.json")))
-
-
 def _schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], set[str]]:
     """Faults against the schema, and the top-level keys that hold one."""
     try:
@@ -192,7 +187,7 @@ def _resolve_fixator(
                     limit=fault.limit,
                     next_step=fault.next_step,
                     hazard=fault.hazard or "H23",
-                    where="fixator" + (f".{fault.where}" if fault.where else ""),
+                    where=fault.where or "fixator",
                 )
                 for fault in error.faults
             ],
@@ -212,6 +207,8 @@ def _cross_faults(
         faults += checks.reading_faults(content["strut_readings_mm"], fixator)
     if content.get("correction") and "correction" not in broken:
         faults += checks.correction_faults(content["correction"])
+        if content["correction"]["kind"] == "deformity" and "limb" not in broken:
+            faults += checks.deformity_faults(content["correction"], content["limb"]["side"])
     return faults
 
 
@@ -229,7 +226,7 @@ def _layout(markers: list[Any]) -> MarkerLayout:
     return MarkerLayout(tuple(sorted(sites, key=lambda site: site.number)))
 
 
-def _correction(kind: Any) -> Correction | None:
+def _correction(kind: Any, side: Literal["left", "right"]) -> Correction | None:
     """The domain value of one correction kind, radians inside."""
     if kind is None:
         return None
@@ -244,10 +241,10 @@ def _correction(kind: Any) -> Correction | None:
     if kind.kind == "landmarks":
         return Landmarks(
             moving=kind.moving,
-            moving_points_mm=np.array(kind.moving_points_lps_mm),
-            fixed_points_mm=np.array(kind.fixed_points_lps_mm),
+            moving_points_lps_mm=np.array(kind.moving_points_lps_mm),
+            fixed_points_lps_mm=np.array(kind.fixed_points_lps_mm),
         )
-    return Deformity(**kind.model_dump(exclude={"kind"}))
+    return Deformity.of(side=side, **kind.model_dump(exclude={"kind"}))
 
 
 def _rules(schedule: Any) -> ScheduleRules | None:
@@ -288,7 +285,7 @@ def _build(
         strut_readings_mm=None
         if model.strut_readings_mm is None
         else np.array(model.strut_readings_mm, float),
-        correction=_correction(model.correction),
+        correction=_correction(model.correction, model.limb.side),
         schedule=_rules(model.schedule),
         document=MappingProxyType(document),
         case_sha256=hashlib.sha256(raw).hexdigest(),

@@ -1,0 +1,20 @@
+"""The straight line from a CT to a prescription; each step takes and returns a frozen value.
+
+read_volume → find_balls → number_balls → ring_pose, mechanism_pose → check_layouts →
+forward_kinematics → correction target, compensation → make_schedule → report → export
+"""
+
+from hexafix.pipeline.layout import check_case_layout
+from hexafix.pipeline.plan import Plan, plan_and_export, plan_correction
+from hexafix.pipeline.recognise import Recognised, find_markers, recognise, recognise_case
+
+__all__ = [
+    "Plan",
+    "Recognised",
+    "check_case_layout",
+    "find_markers",
+    "plan_and_export",
+    "plan_correction",
+    "recognise",
+    "recognise_case",
+]
