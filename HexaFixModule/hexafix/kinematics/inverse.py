@@ -51,7 +51,7 @@ def strut_lengths_batch(
         mm. Source: Eq. (29), (33).
     """
     vectors = strut_vectors(rotations=rotations, positions_mm=positions_mm, fixator=fixator)
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return np.sqrt(np.sum(vectors * vectors, axis=-1))
 
 
 def strut_vectors(
@@ -139,4 +139,4 @@ def condition_number(jacobian: ArrayLike, *, length_mm: float) -> NDArray[np.flo
     scaled[..., 3:] /= length_mm
     values = np.linalg.svd(scaled, compute_uv=False)
     with np.errstate(divide="ignore"):
-        return np.divide(values[..., 0], values[..., -1], dtype=float)
+        return np.asarray(values[..., 0] / values[..., -1], float)
