@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
 from hexafix.correction.targets import Deformity
 from hexafix.errors import Fault, InputError
@@ -99,12 +99,25 @@ def correction_faults(correction: dict[str, Any]) -> Iterator[Fault]:
                 where="correction.fixed_points_lps_mm",
                 next_step="give one fixed point for each moving point",
             )
+    elif kind == "deformity":
+        yield from deformity_faults(correction)
 
 
-def deformity_faults(correction: dict[str, Any], side: Literal["left", "right"]) -> Iterator[Fault]:
+def deformity_of(correction: dict[str, Any]) -> Deformity:
+    """The deformity of the case file's keys; the moving fragment is distal if not said.
+
+    Raises
+    ------
+    InputError
+        For every amount that is not plausible or lacks its direction in words.
+    """
+    given = {key: value for key, value in correction.items() if key != "kind"}
+    return Deformity(**{"moving": "distal", **given})
+
+
+def deformity_faults(correction: dict[str, Any]) -> Iterator[Fault]:
     """Amounts without their direction in words, and amounts that are not plausible."""
     try:
-        given = {key: value for key, value in correction.items() if key != "kind"}
-        Deformity.of(side=side, **{"moving": "distal", **given})
+        deformity_of(correction)
     except InputError as error:
         yield from error.faults

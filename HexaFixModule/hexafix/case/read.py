@@ -6,7 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -17,7 +17,6 @@ from hexafix.case.schema import CaseFile, LayoutFile
 from hexafix.case.strict_json import parse_json_object, read_json_object
 from hexafix.correction.targets import (
     Correction,
-    Deformity,
     FragmentMotion,
     Landmarks,
     TargetPose,
@@ -207,8 +206,6 @@ def _cross_faults(
         faults += checks.reading_faults(content["strut_readings_mm"], fixator)
     if content.get("correction") and "correction" not in broken:
         faults += checks.correction_faults(content["correction"])
-        if content["correction"]["kind"] == "deformity" and "limb" not in broken:
-            faults += checks.deformity_faults(content["correction"], content["limb"]["side"])
     return faults
 
 
@@ -226,7 +223,7 @@ def _layout(markers: list[Any]) -> MarkerLayout:
     return MarkerLayout(tuple(sorted(sites, key=lambda site: site.number)))
 
 
-def _correction(kind: Any, side: Literal["left", "right"]) -> Correction | None:
+def _correction(kind: Any) -> Correction | None:
     """The domain value of one correction kind, radians inside."""
     if kind is None:
         return None
@@ -244,7 +241,7 @@ def _correction(kind: Any, side: Literal["left", "right"]) -> Correction | None:
             moving_points_lps_mm=np.array(kind.moving_points_lps_mm),
             fixed_points_lps_mm=np.array(kind.fixed_points_lps_mm),
         )
-    return Deformity.of(side=side, **kind.model_dump(exclude={"kind"}))
+    return checks.deformity_of(kind.model_dump())
 
 
 def _rules(schedule: Any) -> ScheduleRules | None:
@@ -285,7 +282,7 @@ def _build(
         strut_readings_mm=None
         if model.strut_readings_mm is None
         else np.array(model.strut_readings_mm, float),
-        correction=_correction(model.correction, model.limb.side),
+        correction=_correction(model.correction),
         schedule=_rules(model.schedule),
         document=MappingProxyType(document),
         case_sha256=hashlib.sha256(raw).hexdigest(),
