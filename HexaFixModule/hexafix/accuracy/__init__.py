@@ -1,1 +1,16 @@
 """Layout rules, uniqueness and predicted pose error (Section 4)."""
+
+from hexafix.accuracy.advice import Suggestion, better_layout, check_layouts
+from hexafix.accuracy.layout_check import LayoutCheck, LayoutVerdict, angle_rule, check_layout
+from hexafix.accuracy.layout_gate import layout_faults
+
+__all__ = [
+    "LayoutCheck",
+    "LayoutVerdict",
+    "Suggestion",
+    "angle_rule",
+    "better_layout",
+    "check_layout",
+    "check_layouts",
+    "layout_faults",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,20 +73,8 @@ def _ring_words(
 ) -> str:
     """The change within one ring."""
     if set(chosen) == set(other):
-        around = np.argsort([np.mod(s.sweep_rad, 2 * np.pi) for s in layout.sites], kind="stable")
-        old = [layout.numbers[k] for k in around]
-        new_of_ball = dict(zip(other, layout.numbers, strict=True))
-        new = [new_of_ball[chosen[k]] for k in around]
-        shifts = [old[k:] + old[:k] for k in range(len(old))]
-        verb = "exchanged for"
-        if new in shifts:
-            verb = "turned to"
-        elif new[::-1] in shifts:
-            verb = "turned over to"
-        else:
-            changed = [k for k in range(len(old)) if old[k] != new[k]]
-            old, new = [old[k] for k in changed], [new[k] for k in changed]
-        return f"{side} numbers {_list(old)} {verb} {_list(new)}"
+        order = [other.index(ball) for ball in chosen]
+        return f"{side} {relabelling_words(order, layout)}"
     changes = []
     for marker, old_ball, new_ball in zip(layout.numbers, chosen, other, strict=True):
         if old_ball == new_ball:
@@ -97,3 +86,26 @@ def _ring_words(
 
 def _list(numbers: list[int]) -> str:
     return ",".join(map(str, numbers))
+
+
+def relabelling_words(order: Sequence[int], layout: MarkerLayout) -> str:
+    """A wrong numbering of one ring in words.
+
+    Parameters
+    ----------
+    order : sequence of int
+        Index of the site for which each site's ball is taken, in the order of the layout.
+    """
+    around = np.argsort(np.mod([s.sweep_rad for s in layout.sites], 2 * np.pi), kind="stable")
+    old = [layout.numbers[k] for k in around]
+    new = [layout.numbers[order[k]] for k in around]
+    shifts = [old[k:] + old[:k] for k in range(len(old))]
+    verb = "exchanged for"
+    if new in shifts:
+        verb = "turned to"
+    elif new[::-1] in shifts:
+        verb = "turned over to"
+    else:
+        changed = [k for k in range(len(old)) if old[k] != new[k]]
+        old, new = [old[k] for k in changed], [new[k] for k in changed]
+    return f"numbers {_list(old)} {verb} {_list(new)}"
