@@ -44,14 +44,27 @@ class Crop:
     def _spline(self) -> NDArray[np.float64]:
         return spline_filter(self.voxels, order=3, mode="mirror")
 
-    def sample(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """HU at LPS points, shape (..., 3) to (...), by the cubic spline through the voxels."""
-        index = self.volume.ijk_from_lps(points_mm) - self.first_ijk
-        flat = index[..., ::-1].reshape(-1, 3).T
-        values = map_coordinates(self._spline, flat, order=3, mode="mirror", prefilter=False)
-        return values.reshape(index.shape[:-1])
+    def sample(self, points_mm: NDArray[np.float64], order: int = 3) -> NDArray[np.float64]:
+        """HU at LPS points, shape (..., 3) to (...), by the spline of order 3 or 1."""
+        index = (self.volume.ijk_from_lps(points_mm) - self.first_ijk)[..., ::-1].reshape(-1, 3)
+        source = self._spline if order == 3 else self.voxels
+        values = map_coordinates(source, index.T, order=order, mode="mirror", prefilter=False)
+        return values.reshape(points_mm.shape[:-1])
 
+    @cached_property
     def points_mm(self) -> NDArray[np.float64]:
         """LPS of every voxel, shape (K, J, I, 3), mm."""
-        k, j, i = np.meshgrid(*[np.arange(n) for n in self.voxels.shape], indexing="ij")
-        return self.volume.lps_from_ijk(np.stack([i, j, k], -1) + self.first_ijk)
+        a = self.volume.ijk_to_lps
+        k, j, i = (np.arange(n)[:, None] for n in self.voxels.shape)
+        first = a[:3, :3] @ self.first_ijk + a[:3, 3]
+        plane = (j * a[:3, 1])[:, None] + (i * a[:3, 0])[None]
+        return (first + k * a[:3, 2])[:, None, None] + plane
+
+    def core(self, center_mm: NDArray[np.float64], reach_mm: float) -> tuple[float, float]:
+        """Median HU within a distance of a point, LPS mm, and robust standard deviation."""
+        away = self.points_mm - center_mm
+        values = self.voxels[np.einsum("...i,...i", away, away) < reach_mm**2]
+        if not len(values):
+            return float("nan"), 0.0
+        middle = float(np.median(values))
+        return middle, 1.4826 * float(np.median(np.abs(values - middle)))

@@ -63,12 +63,11 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
     _check_diameter(volume, ball_diameter_mm)
     radius = ball_diameter_mm / 2.0
     points = candidate_centers(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
-    top = volume.voxels.max() if volume.voxels.size else 0
     fitted: list[_Fitted] = []
     rejected: list[Rejected] = []
     for number, point in enumerate(points[:MOST_LOCAL]):
         progress("fitting balls", number / min(len(points), MOST_LOCAL))
-        result = _judge(volume, point, radius, float(top))
+        result = _judge(volume, point, radius)
         if isinstance(result, Rejected):
             rejected.append(result)
         elif result is not None:
@@ -95,9 +94,7 @@ def _check_diameter(volume: Volume, diameter: float) -> None:
         )
 
 
-def _judge(
-    volume: Volume, point: NDArray[np.float64], radius: float, top: float
-) -> _Fitted | Rejected | None:
+def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted | Rejected | None:
     """Fit one candidate and test it; None when nothing round is there."""
     reason = predicates.border_failure(volume, point, radius)
     if reason is not None:
@@ -109,11 +106,12 @@ def _judge(
     reason = predicates.border_failure(volume, rays.center_mm, radius)
     if reason is not None:
         return Rejected(rays.center_mm, reason)
+    top = float(crop.voxels.max())
     clipped = _clipped_share(crop, rays, radius, top)
     clip_hu = top if clipped > 0.02 else None
     thick = float(volume.spacing_mm.max()) > THICK_SLICES_MM
-    kept = None if rays.cut_share == 0.0 else sphere_directions(DIRECTIONS)[~rays.cut]
-    model = fit_model(crop, rays.center_mm, radius, kept=kept, clip_hu=clip_hu, all_voxels=thick)
+    cut = sphere_directions(DIRECTIONS)[rays.cut]
+    model = fit_model(crop, rays.center_mm, radius, cut=cut, clip_hu=clip_hu, all_voxels=thick)
     fitted = rays.radius_mm if model is None or clip_hu is not None else model.radius_mm
     reasons = [
         *predicates.shape_failures(
@@ -130,8 +128,8 @@ def _judge(
 
 
 def _clipped_share(crop: Crop, rays: RayFit, radius: float, top: float) -> float:
-    """Share of the ball's voxels at the volume's greatest value."""
-    inside = np.linalg.norm(crop.points_mm() - rays.center_mm, axis=-1) < 0.8 * radius
+    """Share of the ball's voxels at the greatest value around."""
+    inside = np.linalg.norm(crop.points_mm - rays.center_mm, axis=-1) < 0.8 * radius
     return float(np.mean(crop.voxels[inside] >= top)) if inside.any() else 0.0
 
 

@@ -12,8 +12,10 @@ from hexafix.markers.crop import Crop
 
 INSIDE_MM, OUTSIDE_MM = 2.5, 2.0
 """Voxels from this far inside to this far outside the nominal radius take part."""
-MOST_VOXELS = 2200
+MOST_VOXELS = 1500
 """More voxels than these are thinned evenly; the gate needs no more."""
+CUT_MARGIN_RAD = 0.07
+"""Half the distance of neighbouring rays, about."""
 TUKEY = 4.685
 SIGMA_RANGE_MM = (0.15, 3.0)
 
@@ -50,7 +52,7 @@ def fit_model(
     start_mm: NDArray[np.float64],
     radius_mm: float,
     *,
-    kept: NDArray[np.float64] | None,
+    cut: NDArray[np.float64],
     clip_hu: float | None,
     all_voxels: bool = False,
 ) -> ModelFit | None:
@@ -63,14 +65,14 @@ def fit_model(
         Centre to a fraction of a voxel, LPS mm.
     radius_mm : float
         Nominal radius; held when voxels are clipped.
-    kept : ndarray, shape (n, 3), or None
-        Unit directions whose surroundings are left in; None: all.
+    cut : ndarray, shape (n, 3)
+        Unit directions whose surroundings are left out.
     clip_hu : float or None
         Voxels at this value or above tell nothing.
     all_voxels : bool
         Take every voxel of the band instead of `MOST_VOXELS`.
     """
-    points, values = _band(crop, start_mm, radius_mm, kept, clip_hu, all_voxels)
+    points, values = _band(crop, start_mm, radius_mm, cut, clip_hu, all_voxels)
     if len(values) < 80:
         return None
     axis, nodes, weights = _slice_profile(crop)
@@ -115,24 +117,24 @@ def _band(
     crop: Crop,
     start: NDArray[np.float64],
     radius: float,
-    kept: NDArray[np.float64] | None,
+    cut: NDArray[np.float64],
     clip_hu: float | None,
     all_voxels: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points relative to the start, mm, and HU of the voxels that take part."""
-    points = crop.points_mm().reshape(-1, 3) - start
+    points = crop.points_mm.reshape(-1, 3) - start
     values = crop.voxels.reshape(-1)
-    distance = np.linalg.norm(points, axis=1)
-    take = (distance > max(0.0, radius - INSIDE_MM)) & (distance < radius + OUTSIDE_MM)
+    square = np.einsum("ni,ni->n", points, points)
+    take = (square > max(0.0, radius - INSIDE_MM) ** 2) & (square < (radius + OUTSIDE_MM) ** 2)
     if clip_hu is not None:
         take &= values < clip_hu
     points, values = points[take], values[take]
-    if not all_voxels and len(values) > 2 * MOST_VOXELS:
-        thin = len(values) // MOST_VOXELS
+    if not all_voxels and len(values) > 1.5 * MOST_VOXELS:
+        thin = round(len(values) / MOST_VOXELS)
         points, values = points[::thin], values[::thin]
-    if kept is not None:
-        unit = points / np.linalg.norm(points, axis=1, keepdims=True)
-        take = (unit @ kept.T).max(axis=1) > np.cos(np.radians(6.0))
+    if len(cut):
+        closest = (points.astype(np.float32) @ cut.T.astype(np.float32)).max(axis=1)
+        take = closest < np.cos(CUT_MARGIN_RAD) * np.linalg.norm(points, axis=1)
         points, values = points[take], values[take]
     return points, values
 

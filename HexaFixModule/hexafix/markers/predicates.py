@@ -92,6 +92,8 @@ def stem_failure(crop: Crop, rays: RayFit, radius_mm: float) -> str | None:
     """
     directions = sphere_directions(DIRECTIONS)
     half = rays.outside_hu + 0.5 * (rays.core_hu - rays.outside_hu)
+    if rays.shell_hu.max() < half:
+        return None
     patches = []
     for distance in (radius_mm + 2.0, radius_mm + 3.5):
         values = crop.sample(rays.center_mm + distance * directions)

@@ -14,13 +14,18 @@ from hexafix.markers.crop import Crop
 from hexafix.markers.directions import neighbour_average, sphere_directions
 
 DIRECTIONS = 600
-STEP_MM = 0.2
+PASSES = ((200, 1.75), (DIRECTIONS, 1.0))
+"""Directions and greatest distance of an edge from the radius, mm, of the two passes."""
+SETTLED_MM = 0.05
+"""A longer last step asks for one more pass."""
+STEP_MM = 0.25
+HALF_KERNEL = 4
+SHELL_MM = np.array([1.9, 2.4, 2.9])
+"""Where the surroundings are looked at, beyond the nominal radius."""
 SMOOTH_MM = 0.35
 """Gaussian smoothing along a ray before the gradient is taken."""
 SMOOTH_RAD = 0.08
 """Gaussian smoothing across neighbouring rays."""
-WINDOW_MM = 1.6
-"""An edge lies within this distance of the nominal radius."""
 WEAK_SHARE = 0.4
 """Edges weaker than this share of the median are dropped."""
 TUKEY = 4.685
@@ -95,45 +100,52 @@ def fit_rays(crop: Crop, start_mm: NDArray[np.float64], radius_mm: float) -> Ray
     radius_mm : float
         Nominal radius.
     """
-    center = np.asarray(start_mm, float)
-    fit = None
-    for _ in range(3):
-        fit = _one_pass(crop, center, radius_mm)
+    center, radius = np.asarray(start_mm, float), radius_mm
+    for count, window in PASSES:
+        fit = _one_pass(crop, center, radius, radius_mm, count=count, window=window)
         if fit is None:
             return None
         moved = float(np.linalg.norm(fit.center_mm - center))
-        center = fit.center_mm
-        if moved < 0.02:
-            break
-    return fit
+        center, radius = fit.center_mm, fit.radius_mm
+    return (
+        fit
+        if moved < SETTLED_MM
+        else _one_pass(crop, center, radius, radius_mm, count=count, window=window)
+    )
 
 
-def _one_pass(crop: Crop, center: NDArray[np.float64], radius: float) -> RayFit | None:
-    directions = sphere_directions(DIRECTIONS)
-    distance = np.arange(max(0.3 * radius, radius - 2.6), radius + 3.21, STEP_MM)
+def _one_pass(
+    crop: Crop,
+    center: NDArray[np.float64],
+    radius: float,
+    nominal: float,
+    *,
+    count: int,
+    window: float,
+) -> RayFit | None:
+    """Rays from one centre, edges within `window` of a radius, and the sphere through them."""
+    directions = sphere_directions(count)
+    half = HALF_KERNEL + round(window / STEP_MM)
+    distance = radius + STEP_MM * np.arange(-half, half + 1)
+    distance = distance[distance > 0.1 * radius]
     profile = crop.sample(center + directions[:, None, :] * distance[:, None])
-    core = profile[:, distance < max(0.55 * radius, distance[0] + STEP_MM)]
-    core_hu = float(np.median(core))
-    shell = profile[:, distance > radius + 1.8].mean(axis=1)
+    core_hu, core_noise = crop.core(center, 0.6 * nominal)
+    away = nominal + SHELL_MM[:, None, None]
+    shell = crop.sample(center + directions * away, order=1).mean(axis=0)
     outside = half_sample_mode(shell)
-    smooth = neighbour_average(DIRECTIONS, SMOOTH_RAD) @ profile
-    reach, strength = _steepest(smooth, distance, radius)
+    reach, strength = _steepest(neighbour_average(count, SMOOTH_RAD) @ profile, distance)
     cut = _bright_side(shell, outside, core_hu)
     sound = np.isfinite(reach) & (strength >= WEAK_SHARE * np.median(strength))
     usable = sound & ~cut
-    if usable.sum() < 0.2 * DIRECTIONS:
+    if usable.sum() < 0.2 * count:
         return None
-    solution = _sphere(center, directions, reach, usable)
-    if solution is None:
-        return None
-    new_center, size, residual, weight, normal = solution
-    rms = float(np.sqrt(np.sum(weight * residual**2) / np.sum(weight)))
+    new_center, size, residual, weight, normal = _sphere(center, directions, reach, usable)
     return RayFit(
         center_mm=new_center,
         radius_mm=size,
         residual_mm=np.where(usable, residual, np.nan),
         weight=weight,
-        rms_mm=rms,
+        rms_mm=float(np.sqrt(np.sum(weight * residual**2) / np.sum(weight))),
         normal=normal,
         core_hu=core_hu,
         outside_hu=outside,
@@ -141,22 +153,19 @@ def _one_pass(crop: Crop, center: NDArray[np.float64], radius: float) -> RayFit 
         cut_share=float(cut.mean()),
         edge_share=float((weight > 0).sum() / max(1, (~cut).sum())),
         shell_hu=shell,
-        core_noise_hu=float(1.4826 * np.median(np.abs(core - core_hu))),
+        core_noise_hu=core_noise,
     )
 
 
 def _steepest(
-    profile: NDArray[np.float64], distance: NDArray[np.float64], radius: float
+    profile: NDArray[np.float64], distance: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Distance and strength of the steepest fall along each ray, NaN where there is none."""
-    offsets = np.arange(-4, 5) * STEP_MM
+    offsets = STEP_MM * np.arange(-HALF_KERNEL, HALF_KERNEL + 1)
     kernel = offsets * np.exp(-0.5 * (offsets / SMOOTH_MM) ** 2)
     kernel /= -np.sum(kernel * offsets)
-    windows = np.lib.stride_tricks.sliding_window_view(profile, len(kernel), axis=1)
-    fall = windows @ kernel
-    place = distance[4 : 4 + fall.shape[1]]
-    inside = np.abs(place - radius) <= WINDOW_MM
-    fall, place = fall[:, inside], place[inside]
+    fall = np.lib.stride_tricks.sliding_window_view(profile, len(kernel), axis=1) @ kernel
+    place = distance[HALF_KERNEL:-HALF_KERNEL]
     best = np.argmax(fall, axis=1)
     inner = np.clip(best, 1, fall.shape[1] - 2)
     rows = np.arange(len(fall))
@@ -170,17 +179,17 @@ def _steepest(
 
 def _bright_side(shell: NDArray[np.float64], outside: float, core_hu: float) -> NDArray[np.bool_]:
     """Directions of the rod or of metal, widened to a margin, and their antipodes."""
-    directions = sphere_directions(DIRECTIONS)
-    mild = neighbour_average(DIRECTIONS, 0.12) @ shell
+    directions = sphere_directions(len(shell))
+    mild = neighbour_average(len(shell), 0.12) @ shell
     noise = 1.4826 * float(np.median(np.abs(mild - np.median(mild))))
     limit = outside + max(4.0 * noise, 0.02 * (core_hu - outside))
     bright = mild > limit
     if bright.mean() > 0.35:
         bright = mild > outside + 0.4 * (core_hu - outside)
     if not bright.any():
-        return np.zeros(DIRECTIONS, bool)
+        return np.zeros(len(shell), bool)
     wide = (directions @ directions[bright].T).max(axis=1) > np.cos(np.radians(10.0))
-    both = wide | np.roll(wide, DIRECTIONS // 2)
+    both = wide | np.roll(wide, len(shell) // 2)
     return both if 1.0 - both.mean() >= FEW_LEFT else wide
 
 
@@ -189,7 +198,7 @@ def _sphere(
     directions: NDArray[np.float64],
     reach: NDArray[np.float64],
     usable: NDArray[np.bool_],
-) -> tuple[NDArray, float, NDArray, NDArray, NDArray] | None:
+) -> tuple[NDArray, float, NDArray, NDArray, NDArray]:
     """Geometric sphere fit with Tukey weights: centre, radius, residuals, weights, normal."""
     points = np.where(usable, reach, 0.0)[:, None] * directions
     shift, size = np.zeros(3), float(np.median(reach[usable]))
@@ -204,10 +213,9 @@ def _sphere(
         weight = usable * np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
         rows = np.column_stack([away / length[:, None], np.ones(len(points))])
         normal = rows.T @ (weight[:, None] * rows)
-        if np.linalg.cond(normal) > 1e8:
-            return None
+        normal[np.diag_indices(4)] += 1e-9
         change = np.linalg.solve(normal, rows.T @ (weight * residual))
         shift, size = shift + change[:3], size + float(change[3])
-        if np.abs(change).max() < 1e-5:
+        if np.abs(change).max() < 1e-4:
             break
     return center + shift, size, residual, weight, normal

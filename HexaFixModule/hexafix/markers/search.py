@@ -2,13 +2,15 @@
 
 No threshold in HU and no connected components: a place is a candidate when it is brighter than
 what lies one ball radius further out in most directions, so a ball that touches a ring or another
-ball stays one candidate of its own.
+ball stays one candidate of its own. What the first look takes for a ball is looked at again by
+rays through every voxel, about its own centre and at its own half height.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from hexafix.imaging.volume import Volume
 from hexafix.markers.directions import sphere_directions
@@ -20,18 +22,18 @@ BRIGHT_LITRES = 1.6
 """The first look takes in the brightest matter of the volume up to this amount."""
 DARK_SHARE = 0.55
 """Least share of directions in which the brightness has fallen to half outside a ball."""
-ROUNDS = ((0.9, 0.30), (0.50, 0.45), (0.35, 0.50))
-"""Rounds of rays: share of the radius by which a crossing may miss, least share of rays that hit."""
+ROUNDS = ((32, 0.9, 0.30), (64, 0.50, 0.45), (64, 0.35, 0.50))
+"""Rounds of rays: how many, share of the radius by which a crossing may miss, least hits."""
 ON_SPHERE = 0.12
 """A hit lies this share of the radius from the fitted sphere."""
-MOST_CANDIDATES = 4000
-RAYS = 64
+CHUNK = 16_384
+"""Places polled at a time; bounds the memory."""
 
 
 def candidate_centers(
     volume: Volume, *, ball_diameter_mm: float, progress: Progress
 ) -> NDArray[np.float64]:
-    """Places where a ball of the given diameter could be.
+    """Places where a ball of the given diameter could be, the roundest first.
 
     Parameters
     ----------
@@ -45,23 +47,59 @@ def candidate_centers(
         Centres to about a voxel, LPS mm.
     """
     radius = ball_diameter_mm / 2.0
-    step = _coarse_step(volume, ball_diameter_mm)
-    coarse = np.ascontiguousarray(volume.voxels[:: step[2], :: step[1], :: step[0]])
-    progress("finding balls", 0.1)
-    seeds = _coarse_seeds(coarse, volume.spacing_mm * step, radius)
-    progress("finding balls", 0.2)
-    points = volume.lps_from_ijk(seeds * step)
-    for slack, share in ROUNDS:
-        points = _ray_round(volume, points, radius, slack=slack, least=share)
-        points = _without_doubles(points, 0.25 * radius)
-    progress("finding balls", 0.3)
-    return points
+    pitch = min(COARSE_MM, ball_diameter_mm / 5.0)
+    step = np.maximum(1, np.rint(pitch / volume.spacing_mm).astype(int))
+    progress("finding balls", 0.0)
+    seeds = _coarse_seeds(volume.voxels, step, volume.spacing_mm * step, radius)
+    progress("finding balls", 0.6)
+    centers = seeds * step
+    for rays, slack, least in ROUNDS:
+        centers, hits = _ray_round(volume, centers, radius, rays=rays, slack=slack)
+        order = np.argsort(-hits, kind="stable")
+        order = order[hits[order] >= least]
+        centers = centers[order]
+        centers = centers[_far_apart(centers * volume.spacing_mm, 0.25 * radius)]
+    progress("finding balls", 1.0)
+    return volume.lps_from_ijk(centers)
 
 
-def _coarse_step(volume: Volume, diameter: float) -> NDArray[np.int64]:
-    """Voxels per coarse step along i, j, k."""
-    pitch = min(COARSE_MM, diameter / 5.0)
-    return np.maximum(1, np.rint(pitch / volume.spacing_mm).astype(int))
+def _coarse_seeds(
+    voxels: NDArray, step: NDArray[np.int64], pitch: NDArray[np.float64], radius: float
+) -> NDArray[np.float64]:
+    """Coarse indices (i, j, k) of places bright inside and dark outside, shape (M, 3)."""
+    inner = _shifts(pitch, max(0.25 * radius, float(pitch.min())), _FACES)
+    few = _shifts(pitch, radius + 0.5 * float(np.linalg.norm(pitch)) + 1.2, _CORNERS)
+    many = _shifts(pitch, radius + 0.5 * float(np.linalg.norm(pitch)) + 1.2, _POLLS)
+    margin = np.abs(np.vstack([inner, few, many])).max(axis=0)
+    coarse = _padded(voxels[:: step[2], :: step[1], :: step[0]], margin[::-1])
+    flat = np.flatnonzero(coarse.reshape(-1) > _bright_level(coarse, float(np.prod(pitch))))
+    strides = np.array([1, coarse.shape[2], coarse.shape[2] * coarse.shape[1]])
+    jumps = [shifts @ strides for shifts in (inner, few, many)]
+    parts = [
+        _polled(coarse.reshape(-1), flat[start : start + CHUNK], *jumps)
+        for start in range(0, len(flat), CHUNK)
+    ]
+    flat = np.concatenate([part[0] for part in parts] + [np.empty(0, int)])
+    score = np.concatenate([part[1] for part in parts] + [np.empty(0)])
+    flat = flat[np.argsort(-score, kind="stable")]
+    place = np.stack(np.unravel_index(flat, coarse.shape)[::-1], axis=-1) - margin
+    _, best = np.unique(place // 2 @ (2 * strides), return_index=True)
+    place = place[np.sort(best)]
+    return place[_far_apart(place * pitch, 0.9 * radius)].astype(float)
+
+
+def _padded(coarse: NDArray, margin: NDArray[np.int64]) -> NDArray:
+    """A copy with a margin of the darkest value on every face."""
+    shape = [n + 2 * m for n, m in zip(coarse.shape, margin, strict=True)]
+    inside = tuple(slice(m, m + n) for n, m in zip(coarse.shape, margin, strict=True))
+    padded = np.empty(shape, coarse.dtype)
+    padded[inside] = coarse
+    darkest = padded[inside].min() if coarse.size else 0
+    for axis, part in enumerate(inside):
+        face: list[slice] = [slice(None)] * 3
+        for face[axis] in (slice(0, part.start), slice(part.stop, None)):
+            padded[tuple(face)] = darkest
+    return padded
 
 
 def _bright_level(coarse: NDArray, cell_mm3: float) -> float:
@@ -70,10 +108,8 @@ def _bright_level(coarse: NDArray, cell_mm3: float) -> float:
     sample = np.asarray(coarse[::stride, ::stride, ::stride], float).ravel()
     low, high = float(np.median(sample)), float(coarse.max())
     level = low + 0.05 * (high - low)
-    keep = BRIGHT_LITRES * 1e6 / cell_mm3 / coarse.size
-    if keep < 1.0:
-        level = max(level, float(np.quantile(sample, 1.0 - keep)))
-    return level
+    share = BRIGHT_LITRES * 1e6 / cell_mm3 / coarse.size
+    return level if share >= 1.0 else max(level, float(np.quantile(sample, 1.0 - share)))
 
 
 def _shifts(pitch: NDArray[np.float64], distance: float, directions: NDArray) -> NDArray[np.int64]:
@@ -81,125 +117,91 @@ def _shifts(pitch: NDArray[np.float64], distance: float, directions: NDArray) ->
     return np.unique(np.rint(distance * directions / pitch).astype(int), axis=0)
 
 
-def _coarse_seeds(
-    coarse: NDArray, pitch: NDArray[np.float64], radius: float
-) -> NDArray[np.float64]:
-    """Coarse indices (i, j, k) of places bright inside and dark outside, shape (M, 3)."""
-    level = _bright_level(coarse, float(np.prod(pitch)))
-    flat = np.flatnonzero(coarse.reshape(-1) > level)
-    parts = [
-        _polled(coarse, pitch, radius, flat[start : start + 32_768])
-        for start in range(0, len(flat), 32_768)
-    ]
-    places = np.concatenate([np.empty((0, 3), int)] + [p[0] for p in parts])
-    scores = np.concatenate([np.empty(0)] + [p[1] for p in parts])
-    return _best_of_neighbours(places, scores, pitch, 0.5 * radius)
-
-
 def _polled(
-    coarse: NDArray, pitch: NDArray[np.float64], radius: float, flat: NDArray[np.int64]
+    values: NDArray,
+    flat: NDArray[np.int64],
+    inner: NDArray[np.int64],
+    few: NDArray[np.int64],
+    many: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The places of flat coarse indices that pass the poll, and their brightness inside."""
-    shape = np.array(coarse.shape[::-1])
-    strides = np.array([1, shape[0], shape[0] * shape[1]])
-    place = np.stack([flat % shape[0], flat // shape[0] % shape[1], flat // strides[2]], -1)
-    values = coarse.reshape(-1)
+    """Flat indices that pass the poll, and how ball-like each is, the cheap questions first."""
+    inside = np.min([values[flat + jump] for jump in inner], axis=0).astype(np.float32)
+    outside = np.array([values[flat + jump] for jump in few])
     center = values[flat].astype(np.float32)
-    outer = _shifts(pitch, radius + float(np.linalg.norm(pitch)) / 2.0 + 1.2, _POLLS)
-    outside = _gathered(values, place, outer, shape, strides, float(coarse.min()))
-    outside.sort(axis=0)
-    back = outside[len(outer) // 4]
+    half = 0.5 * (center + outside.min(axis=0))
+    keep = (inside > half) & ((outside < half).sum(axis=0) >= 0.4 * len(few))
+    flat, center, inside = flat[keep], center[keep], inside[keep]
+    outside = np.array([values[flat + jump] for jump in many], dtype=np.float32)
+    back = np.partition(outside, len(many) // 4, axis=0)[len(many) // 4]
     half = 0.5 * (center + back)
     dark = np.mean(outside < half, axis=0)
-    keep = dark >= DARK_SHARE
-    place, half, center, back = place[keep], half[keep], center[keep], back[keep]
-    inner = _shifts(
-        pitch, max(0.25 * radius, float(pitch.min())), np.vstack([np.eye(3), -np.eye(3)])
-    )
-    inside = _gathered(values, place, inner, shape, strides, float(coarse.min()))
-    keep = (inside > half).all(axis=0)
-    return place[keep], inside[:, keep].mean(axis=0)
+    keep = (dark >= DARK_SHARE) & (inside > half)
+    depth = (inside - half)[keep] / (center - back)[keep]
+    return flat[keep], dark[keep] + 0.5 * depth.astype(float)
 
 
-def _gathered(
-    values: NDArray,
-    place: NDArray[np.int64],
-    shifts: NDArray[np.int64],
-    shape: NDArray[np.int64],
-    strides: NDArray[np.int64],
-    beyond: float,
-) -> NDArray[np.float32]:
-    """Values at shifted places, shape (shifts, places); `beyond` outside the volume."""
-    result = np.empty((len(shifts), len(place)), np.float32)
-    for row, shift in zip(result, shifts, strict=True):
-        moved = place + shift
-        inside = np.all((moved >= 0) & (moved < shape), axis=1)
-        row[:] = beyond
-        row[inside] = values[moved[inside] @ strides]
-    return result
-
-
-def _best_of_neighbours(
-    place: NDArray[np.int64], score: NDArray, pitch: NDArray[np.float64], reach: float
-) -> NDArray[np.float64]:
-    """The places that nothing brighter within `reach` mm displaces, the brightest first."""
-    order = np.argsort(-score, kind="stable")
-    points = (place * pitch)[order]
-    kept = _without_doubles(points, reach)
-    return kept[:MOST_CANDIDATES] / pitch
-
-
-def _without_doubles(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-    """Points in their order, each farther than `reach` from every one kept before it."""
-    from scipy.spatial import cKDTree
-
-    if len(points) < 2:
-        return points
-    tree = cKDTree(points)
+def _far_apart(points: NDArray[np.float64], reach: float) -> NDArray[np.int64]:
+    """Indices, in order, of points farther than `reach` from every one kept before them."""
     kept = np.ones(len(points), bool)
-    for index, near in enumerate(tree.query_ball_point(points, reach)):
-        if kept[index]:
-            near = np.asarray(near)
-            kept[near[near > index]] = False
-    return points[kept]
+    if len(points) > 1:
+        pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+        pairs = pairs[np.argsort(pairs.min(axis=1), kind="stable")]
+        for first, second in zip(pairs.min(axis=1), pairs.max(axis=1), strict=True):
+            if kept[first]:
+                kept[second] = False
+    return np.flatnonzero(kept)
 
 
 def _ray_round(
-    volume: Volume, points: NDArray[np.float64], radius: float, *, slack: float, least: float
-) -> NDArray[np.float64]:
-    """Points moved to the sphere through their half-height crossings, the roundest first."""
-    if not len(points):
-        return points
-    parts = [
-        _ray_chunk(volume, points[start : start + 128], radius, slack)
-        for start in range(0, len(points), 128)
-    ]
-    moved = np.concatenate([part[0] for part in parts])
-    share = np.concatenate([part[1] for part in parts])
-    order = np.argsort(-share, kind="stable")
-    return moved[order][share[order] >= least]
-
-
-def _ray_chunk(
-    volume: Volume, points: NDArray[np.float64], radius: float, slack: float
+    volume: Volume, centers: NDArray[np.float64], radius: float, *, rays: int, slack: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Moved points and the share of their rays that hit the fitted sphere."""
+    """Centres (i, j, k) moved to the sphere of their half-height crossings, and shares of hits."""
     step = 0.125 * radius
     distance = np.arange(0.0, radius + 2.5, step)
-    rays = _RAYS[:, None, :] * distance[:, None]
-    profile = _nearest(volume, points[:, None, None, :] + rays)
-    core = np.median(profile[:, ::4, distance < 0.5 * radius], axis=(1, 2))
-    back = np.quantile(profile[:, :, -2:].min(axis=2), 0.25, axis=1)
-    half = 0.5 * (core + back)
-    below = profile < half[:, None, None]
-    first = np.maximum(below.argmax(axis=2), 1)
-    high = np.take_along_axis(profile, first[..., None] - 1, 2)[..., 0]
-    low = np.take_along_axis(profile, first[..., None], 2)[..., 0]
-    share = np.clip((high - half[:, None]) / np.maximum(high - low, 1e-9), 0.0, 1.0)
-    reach = (first - 1 + share) * step
-    near = below.any(axis=2) & (np.abs(reach - radius) < slack * radius)
-    shift, hits = _sphere_shift(reach[..., None] * _RAYS, near)
-    return points + shift, np.where(core > back, hits, 0.0)
+    inverse = np.linalg.inv(volume.ijk_to_lps[:3, :3])
+    directions = sphere_directions(rays)
+    jumps = np.rint((distance[:, None, None] * directions) @ inverse.T).astype(np.int64)
+    moved, hits = [np.empty((0, 3))], [np.empty(0)]
+    for start in range(0, len(centers), 128):
+        near = np.rint(centers[start : start + 128]).astype(np.int64)
+        profile = _profiles(volume, near, jumps)
+        reach, crossed = _half_height(profile, distance, radius)
+        crossed &= np.abs(reach - radius) < slack * radius
+        shift, hit = _sphere_shift(reach[..., None] * directions, crossed)
+        moved.append(near + shift @ inverse.T)
+        hits.append(hit)
+    return np.concatenate(moved), np.concatenate(hits)
+
+
+def _profiles(
+    volume: Volume, near: NDArray[np.int64], jumps: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Voxels along rays, shape (distances, M, rays); the volume's edge repeats beyond it."""
+    voxels, size = volume.voxels, np.array(volume.size_ijk)
+    reach = np.abs(jumps).max(axis=(0, 1))
+    if voxels.flags.c_contiguous and np.all((near >= reach) & (near < size - reach)):
+        strides = np.array([1, size[0], size[0] * size[1]])
+        flat = (near @ strides)[None, :, None] + (jumps @ strides)[:, None, :]
+        return voxels.reshape(-1)[flat].astype(np.float32)
+    index = np.clip(near[None, :, None] + jumps[:, None], 0, size - 1)
+    return voxels[index[..., 2], index[..., 1], index[..., 0]].astype(np.float32)
+
+
+def _half_height(
+    profile: NDArray[np.float32], distance: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """First fall to half height along each ray: distance and whether there is one, (M, rays)."""
+    core = np.median(profile[distance < 0.5 * radius, :, ::4], axis=(0, 2))
+    tail = profile[-2:].min(axis=0)
+    back = np.partition(tail, tail.shape[1] // 4, axis=1)[:, tail.shape[1] // 4]
+    half = 0.5 * (core + back)[:, None]
+    below = profile < half
+    first = np.maximum(below.argmax(axis=0), 1)[None]
+    high = np.take_along_axis(profile, first - 1, 0)[0]
+    low = np.take_along_axis(profile, first, 0)[0]
+    share = np.clip((high - half) / np.maximum(high - low, 1e-6), 0.0, 1.0)
+    reach = (first[0] - 1 + share) * (distance[1] - distance[0])
+    return reach, below.any(axis=0) & (core > back)[:, None]
 
 
 def _sphere_shift(
@@ -209,6 +211,7 @@ def _sphere_shift(
     rows = np.concatenate([edge, np.ones_like(edge[..., :1])], axis=-1)
     right = 0.5 * np.sum(edge**2, axis=-1)[..., None]
     weight = near.astype(float)
+    center, hit = np.zeros((len(edge), 3)), near
     for _ in range(2):
         weighted = np.swapaxes(rows * weight[..., None], 1, 2)
         solution = np.linalg.solve(weighted @ rows + 1e-6 * np.eye(4), weighted @ right)[..., 0]
@@ -220,12 +223,6 @@ def _sphere_shift(
     return center, hit.mean(axis=1)
 
 
-def _nearest(volume: Volume, points: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Nearest voxels of LPS points, the volume's edge repeated beyond it."""
-    index = np.rint(volume.ijk_from_lps(points)).astype(int)
-    np.clip(index, 0, np.array(volume.size_ijk) - 1, out=index)
-    return volume.voxels[index[..., 2], index[..., 1], index[..., 0]].astype(np.float32)
-
-
+_FACES = np.vstack([np.eye(3), -np.eye(3)])
+_CORNERS = np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]) / np.sqrt(3.0)
 _POLLS = sphere_directions(26)
-_RAYS = sphere_directions(RAYS)
