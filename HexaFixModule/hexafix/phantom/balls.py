@@ -56,7 +56,7 @@ def paint_ball(slab: Array, first_slice: int, ball: ExactBall, grid: Grid) -> No
     Gauss–Legendre nodes.
     """
     center = Pose(np.eye(3), ball.center_mm)
-    extent = (ball.radius_mm,) * 3
+    extent = (ball.radius_mm, ball.radius_mm, ball.radius_mm)
     widest = float(np.linalg.norm([*grid.spacing_mm[:2], grid.thickness_mm]))
     reach = REACH_SIGMA * grid.psf_sigma_mm + widest
     low = (-extent[0], -extent[1], -extent[2])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
-from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, generate_uid
+from pydicom.uid import UID, CTImageStorage, ExplicitVRLittleEndian, generate_uid
 
 from hexafix.imaging import Volume
 from hexafix.progress import Progress, silent
@@ -63,9 +63,9 @@ def write_dicom_series(
     slices = volume.size_ijk[2]
     for k in range(slices):
         position = affine[:3, 3] + k * affine[:3, 2]
-        dataset = FileDataset(None, template, file_meta=_meta(), preamble=b"\0" * 128)
         uid = _uid(root, "instance", k)
-        dataset.file_meta.MediaStorageSOPInstanceUID = dataset.SOPInstanceUID = uid
+        dataset = FileDataset("", template, file_meta=_meta(uid), preamble=b"\0" * 128)
+        dataset.SOPInstanceUID = uid
         dataset.InstanceNumber = k + 1
         dataset.ImagePositionPatient = [decimal_string(v) for v in position]
         dataset.SliceLocation = decimal_string(float(position @ normal))
@@ -78,15 +78,16 @@ def write_dicom_series(
     return str(template.SeriesInstanceUID)
 
 
-def _uid(root: str, *parts: object) -> str:
+def _uid(root: str, *parts: object) -> UID:
     return generate_uid(prefix=UID_PREFIX, entropy_srcs=[root, *map(str, parts)])
 
 
-def _meta() -> FileMetaDataset:
+def _meta(uid: UID) -> FileMetaDataset:
     meta = FileMetaDataset()
     meta.MediaStorageSOPClassUID = CTImageStorage
+    meta.MediaStorageSOPInstanceUID = uid
     meta.TransferSyntaxUID = ExplicitVRLittleEndian
-    meta.ImplementationClassUID = UID_PREFIX + "1"
+    meta.ImplementationClassUID = UID(UID_PREFIX + "1")
     meta.ImplementationVersionName = "HEXAFIX"
     return meta
 

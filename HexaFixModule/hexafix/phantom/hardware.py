@@ -21,7 +21,8 @@ from hexafix.phantom.solids import (
 from hexafix.phantom.spec import ALUMINIUM_HU, RING_HU, STEEL_HU, PhantomSpec
 
 PLATE_WIDTH_MM, HOLE_RADIUS_MM, HOLES = 30.0, 3.5, 36
-JOINT_RADIUS_MM = 6.0
+JOINT_RADIUS_MM, STRUT_RADIUS_MM = 6.0, 6.0
+JOINT_RADII_MM = (JOINT_RADIUS_MM, JOINT_RADIUS_MM, JOINT_RADIUS_MM)
 WIRE_DIAMETER_MM, PIN_DIAMETER_MM = 1.8, 5.0
 
 
@@ -66,12 +67,12 @@ def strut(lower_mm: NDArray, upper_mm: NDArray) -> list[Solid]:
     split = 0.55 * length
     bars = [
         cylinder(pose, 0.0, length, 3.0, ((0.0, STEEL_HU),)),
-        cylinder(pose, 14.0, split, 6.0, ((0.0, ALUMINIUM_HU), (1.6, -1000.0))),
+        cylinder(pose, 14.0, split, STRUT_RADIUS_MM, ((0.0, ALUMINIUM_HU), (1.6, -1000.0))),
         cylinder(pose, 14.0, length - 14.0, 3.4, ((0.0, STEEL_HU),)),
         cylinder(pose, split - 2.0, split + 9.0, 8.5, ((0.0, ALUMINIUM_HU),)),
     ]
     joints = [
-        ellipsoid(Pose(np.eye(3), center), (JOINT_RADIUS_MM,) * 3, STEEL_HU)
+        ellipsoid(Pose(np.eye(3), center), JOINT_RADII_MM, STEEL_HU)
         for center in (lower_mm, upper_mm)
     ]
     return bars + joints

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hexafix.errors import Fault, InputError
 from hexafix.imaging import ImageSource, Volume
+from hexafix.imaging.fingerprint import fingerprint
 from hexafix.phantom.balls import ExactBall
 from hexafix.phantom.decoys import decoys_of
-from hexafix.phantom.hardware import frame_solids
+from hexafix.phantom.hardware import STRUT_RADIUS_MM, frame_solids
 from hexafix.phantom.limb import limb_solids
 from hexafix.phantom.render import render
-from hexafix.phantom.scene import Scene, build_scene
+from hexafix.phantom.scene import Scene, build_scene, distance_to_struts_mm
 from hexafix.phantom.spec import PhantomSpec
 from hexafix.phantom.streaks import streaks_of
 from hexafix.phantom.truth import case_document, truth_document
@@ -79,11 +81,9 @@ def make_phantom(
         progress=progress,
         workers=workers,
     )
-    digest = hashlib.sha256(scene.grid.ijk_to_lps.tobytes())
-    digest.update(voxels)
     source = ImageSource(
         kind="memory",
-        sha256=digest.hexdigest(),
+        sha256=fingerprint(voxels, scene.grid.ijk_to_lps),
         slice_thickness_mm=spec.thickness_mm,
         laterality=spec.side[0].upper(),
         body_part=BODY_PART.get(spec.bone, "EXTREMITY"),
@@ -121,6 +121,19 @@ def _check(spec: PhantomSpec, scene: Scene, truth: dict[str, Any]) -> None:
                     str([round(c, 1) for c in ball["center_mm"]]) + " mm LPS",
                     "inside, with its blur",
                     "choose more or larger voxels, or ask for a partial frame",
+                )
+            )
+    room = distance_to_struts_mm(scene, np.array(list(scene.balls_mm.values())))
+    least = spec.ball_diameter_mm / 2.0 + STRUT_RADIUS_MM
+    for number, gap in zip(scene.balls_mm, room, strict=True):
+        if gap < least:
+            faults.append(
+                Fault(
+                    "phantom-collision",
+                    f"ball {number} would sit in a strut",
+                    f"{gap:.1f} mm from its axis",
+                    f"≥ {least:.1f} mm",
+                    "give this marker another sweep angle",
                 )
             )
     if faults:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.geometry import Pose, matrix_from_xyz_fixed
-from hexafix.hardware import MarkerLayout
 from hexafix.kinematics import strut_lengths
 from hexafix.phantom.solids import Grid
 from hexafix.phantom.spec import PhantomSpec
@@ -107,12 +106,17 @@ def _readings(spec: PhantomSpec, lengths: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def _extent(spec: PhantomSpec, ring_a: Pose, ring_b: Pose) -> NDArray[np.float64]:
-    """Two opposite corners of the box around all balls in LPS, shape (2, 3), mm."""
-
-    def corners(ring: Pose, layout: MarkerLayout) -> NDArray[np.float64]:
-        return ring.apply(layout.points_mm)
-
-    points = np.concatenate([corners(ring_a, spec.proximal), corners(ring_b, spec.distal)])
+    """Two opposite corners of the box around balls and plates in LPS, shape (2, 3), mm."""
+    sweep = np.radians(np.arange(0.0, 360.0, 10.0))
+    parts = []
+    for pose, ring, layout in (
+        (ring_a, spec.fixator.proximal, spec.proximal),
+        (ring_b, spec.fixator.distal, spec.distal),
+    ):
+        rim = ring.outer_radius_mm * np.stack([np.cos(sweep), np.sin(sweep), 0.0 * sweep], -1)
+        lower = rim - np.array([0.0, 0.0, ring.thickness_mm])
+        parts += [pose.apply(points) for points in (layout.points_mm, rim, lower)]
+    points = np.concatenate(parts)
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
@@ -126,3 +130,11 @@ def _grid(spec: PhantomSpec, middle_mm: NDArray[np.float64]) -> Grid:
     affine[:3, :3] = axes * np.array(spec.spacing_mm)
     affine[:3, 3] = np.round(center - affine[:3, :3] @ ((np.array(spec.size_ijk) - 1) / 2.0), 4)
     return Grid(affine, spec.size_ijk, spec.thickness_mm, spec.psf_sigma_mm)
+
+
+def distance_to_struts_mm(scene: Scene, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points, shape (N, 3), LPS mm, from the nearest strut's axis, shape (N,)."""
+    start, line = scene.joints_b_mm, scene.joints_a_mm - scene.joints_b_mm
+    offset = points_mm[:, None] - start
+    share = np.clip(np.sum(offset * line, -1) / np.sum(line * line, -1), 0.0, 1.0)
+    return np.linalg.norm(offset - share[..., None] * line, axis=-1).min(axis=1)

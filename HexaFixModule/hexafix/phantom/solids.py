@@ -11,7 +11,8 @@ from scipy.special import erfc
 
 from hexafix.geometry import Pose
 
-Array = NDArray[np.float32]
+Array = NDArray[np.floating]
+Size = tuple[float, float, float]
 Distance = Callable[[Array, Array, Array], Array]
 
 
@@ -33,8 +34,8 @@ class Solid:
 
     distance: Distance
     pose: Pose
-    low_mm: tuple[float, float, float]
-    high_mm: tuple[float, float, float]
+    low_mm: Size
+    high_mm: Size
     layers: tuple[tuple[float, float], ...]
 
 
@@ -108,8 +109,8 @@ def paint(slab: Array, first_slice: int, solid: Solid, grid: Grid) -> None:
 
 def box_in_slab(
     pose: Pose,
-    low_mm: tuple[float, float, float],
-    high_mm: tuple[float, float, float],
+    low_mm: Size,
+    high_mm: Size,
     reach_mm: float,
     grid: Grid,
     slices: int,
@@ -130,6 +131,7 @@ def box_in_slab(
         The slab.
     """
     ends = np.array([low_mm, high_mm]) + np.array([[-reach_mm], [reach_mm]])
+    ends[:, 2] = _z_in_slab(pose, ends, grid, slices, first_slice)
     corners = np.stack(np.meshgrid(*ends.T, indexing="ij"), -1).reshape(-1, 3)
     inverse = np.linalg.inv(grid.ijk_to_lps)
     ijk = pose.apply(corners) @ inverse[:3, :3].T + inverse[:3, 3]
@@ -142,6 +144,21 @@ def box_in_slab(
             return None
         ranges.append(range(start, stop))
     return ranges[0], ranges[1], ranges[2]
+
+
+def _z_in_slab(
+    pose: Pose, ends: NDArray[np.float64], grid: Grid, slices: int, first_slice: int
+) -> NDArray[np.float64]:
+    """The part of a box's z range that can lie in the slab, so that long bars stay cheap."""
+    inverse = np.linalg.inv(grid.ijk_to_lps)
+    per_mm = inverse[2, :3] @ pose.rotation
+    if abs(per_mm[2]) * grid.spacing_mm[2] < 0.05:
+        return ends[:, 2]
+    start = inverse[2, :3] @ pose.position_mm + inverse[2, 3]
+    sideways = np.abs(per_mm[:2]) @ np.abs(ends[:, :2]).max(axis=0) + 1.0
+    limits = np.array([first_slice - sideways, first_slice + slices + sideways])
+    limits = np.sort((limits - start) / per_mm[2])
+    return np.clip(limits, ends[0, 2], ends[1, 2])
 
 
 def local_coordinates(
@@ -219,7 +236,7 @@ def hex_prism(pose: Pose, bottom_mm: float, top_mm: float, flats_mm: float, hu: 
     return Solid(distance, pose, (-r, -r, bottom_mm), (r, r, top_mm), ((0.0, hu),))
 
 
-def ellipsoid(pose: Pose, radii_mm: tuple[float, float, float], hu: float) -> Solid:
+def ellipsoid(pose: Pose, radii_mm: Size, hu: float) -> Solid:
     """Ellipsoid about a frame's origin; the distance is exact on the axes and near the surface."""
     a, b, c = (np.float32(r) for r in radii_mm)
 
@@ -238,13 +255,11 @@ def half_ball(pose: Pose, radius_mm: float, hu: float) -> Solid:
     def distance(x: Array, y: Array, z: Array) -> Array:
         return np.maximum(np.sqrt(x * x + y * y + z * z) - np.float32(radius_mm), -z)
 
-    low, high = (-radius_mm, -radius_mm, 0.0), (radius_mm,) * 3
+    low, high = (-radius_mm, -radius_mm, 0.0), (radius_mm, radius_mm, radius_mm)
     return Solid(distance, pose, low, high, ((0.0, hu),))
 
 
-def slab_box(
-    pose: Pose, half_mm: tuple[float, float, float], layers: tuple[tuple[float, float], ...]
-) -> Solid:
+def slab_box(pose: Pose, half_mm: Size, layers: tuple[tuple[float, float], ...]) -> Solid:
     """Rectangular board about a frame's origin with half sizes along its axes."""
     a, b, c = (np.float32(h) for h in half_mm)
 

@@ -10,7 +10,7 @@ from hexafix.errors import Fault, InputError
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, shipped_fixator
 
-CORRECTIONS = ("target-pose", "fragment-motion", "landmarks")
+CORRECTIONS = ("target-pose", "fragment-motion", "landmarks", "deformity")
 INSTALLATION_SIGMA_MM = 0.4 / 6
 """Manufacturing tolerance of a marker per axis. Source: Section 4.2.1 (three-sigma rule)."""
 AIR_HU = -1000.0
@@ -56,7 +56,7 @@ class PhantomSpec:
     image_angles_rad : tuple of float
         X-Y-Z fixed angles of the axes i, j, k in LPS.
     image_center_mm : tuple of float or None
-        LPS point in the middle of the volume; None: in the middle of the marker balls.
+        LPS point in the middle of the volume; None: in the middle of the frame.
     fixator : Fixator
     ring_b_pose : Pose
         {B}, the distal ring, in LPS.
@@ -103,7 +103,7 @@ class PhantomSpec:
 
     seed: int = 0
     size_ijk: tuple[int, int, int] = (512, 512, 400)
-    spacing_mm: tuple[float, float, float] = (0.7, 0.7, 0.65)
+    spacing_mm: tuple[float, float, float] = (0.65, 0.65, 0.7)
     slice_thickness_mm: float | None = None
     image_angles_rad: tuple[float, float, float] = (0.03, -0.02, 0.05)
     image_center_mm: tuple[float, float, float] | None = None

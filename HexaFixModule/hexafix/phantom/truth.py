@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, Ring, shipped_fixator, shipped_fixators
+from hexafix.kinematics import strut_lengths
+from hexafix.phantom.clinical import deformity_document
 from hexafix.phantom.scene import Scene
 from hexafix.phantom.spec import PhantomSpec
 
@@ -85,6 +87,7 @@ def truth_document(spec: PhantomSpec, scene: Scene, decoys: list[dict[str, Any]]
             "mechanism": pose_document(spec.target_pose),
             "moving": spec.moving,
             "fragment_motion_lps": numbers(motion.matrix),
+            "strut_length_mm": numbers(strut_lengths(spec.target_pose, spec.fixator)),
         },
     }
 
@@ -196,6 +199,10 @@ def correction_document(spec: PhantomSpec, scene: Scene) -> dict[str, Any]:
             "moving_points_lps_mm": numbers(points),
             "fixed_points_lps_mm": numbers(motion.apply(points)),
         }
+    if spec.correction == "deformity":
+        return deformity_document(
+            motion=motion, point_mm=moving.position_mm, moving=spec.moving, side=spec.side
+        )
     return {
         "kind": "target-pose",
         "position_mm": numbers(spec.target_pose.position_mm),
