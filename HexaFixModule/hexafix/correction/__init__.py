@@ -9,6 +9,9 @@ from hexafix.correction.compensation import (
     target_of,
 )
 from hexafix.correction.landmarks import LandmarkFit, fit_landmarks
+from hexafix.correction.path import Pace, RigidPath, WatchedPoints, watched_points
+from hexafix.correction.schedule import ScheduleRow, StrutSchedule, make_schedule
+from hexafix.correction.stroke import StrokeCheck
 from hexafix.correction.targets import (
     Correction,
     Deformity,
@@ -26,11 +29,19 @@ __all__ = [
     "FragmentMotion",
     "LandmarkFit",
     "Landmarks",
+    "Pace",
     "RecognisedRings",
+    "RigidPath",
+    "ScheduleRow",
+    "StrokeCheck",
+    "StrutSchedule",
     "TargetPose",
+    "WatchedPoints",
     "compensate",
     "fit_landmarks",
+    "make_schedule",
     "motion_between",
     "planned_motion",
     "target_of",
+    "watched_points",
 ]

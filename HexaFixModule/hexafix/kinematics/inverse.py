@@ -109,7 +109,7 @@ def strut_jacobian_batch(
     vectors = strut_vectors(rotations=r, positions_mm=positions_mm, fixator=fixator)
     axes = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     axes_in_ring = axes @ r
-    moments = np.cross(fixator.proximal.joints_mm, axes_in_ring)
+    moments = np.asarray(np.cross(fixator.proximal.joints_mm, axes_in_ring), float)
     return np.concatenate([axes_in_ring, moments], axis=-1)
 
 
