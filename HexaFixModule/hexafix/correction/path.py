@@ -50,21 +50,20 @@ class WatchedPoints:
     names : tuple of str
     points_mm : ndarray, shape (P, 3)
         The points whose speed is limited, mm.
-    interest_mm : ndarray, shape (Q, 3)
-        The points where an error of rounding counts, mm.
+    interest_mm : ndarray, shape (Q, 3), or None
+        The points where an error of rounding counts, mm; None for the middle between the rings.
     """
 
     names: tuple[str, ...]
     points_mm: NDArray[np.float64]
-    interest_mm: NDArray[np.float64]
+    interest_mm: NDArray[np.float64] | None = None
 
 
 def watched_points(
     fixator: Fixator,
     *,
     moving: Moving,
-    proximal: Pose,
-    distal: Pose,
+    moving_ring: Pose,
     structures_lps_mm: ArrayLike | None = None,
     fracture_lps_mm: ArrayLike | None = None,
 ) -> WatchedPoints:
@@ -74,18 +73,15 @@ def watched_points(
     ----------
     fixator : Fixator
     moving : {'proximal', 'distal'}
-    proximal, distal : Pose
-        The rings in LPS, as the compensation left them.
+    moving_ring : Pose
+        The moving ring in LPS, as the compensation left it.
     structures_lps_mm : array_like, shape (P, 3), optional
         Points of the moving fragment, LPS, mm; their speed is limited and their error counts.
     fracture_lps_mm : array_like, shape (3,), optional
         Where an error of rounding counts if there are no structures, LPS, mm; without it, the
-        middle between the rings' origins, the place nearest to a fracture that is known.
+        middle between the rings' origins, the nearest to a fracture that is known.
     """
-    ring = proximal if moving == "proximal" else distal
-    middle = 0.5 * (proximal.position_mm + distal.position_mm)
-    fracture = middle if fracture_lps_mm is None else np.asarray(fracture_lps_mm, float)
-    interest = ring.inverse().apply(fracture[None])
+    to_ring = moving_ring.inverse()
     if structures_lps_mm is not None:
         points = np.asarray(structures_lps_mm, float)
         if points.ndim != 2 or points.shape[1] != 3 or not np.all(np.isfinite(points)):
@@ -98,13 +94,16 @@ def watched_points(
             )
         if len(points):
             names = tuple(f"structure at risk {k}" for k in range(1, len(points) + 1))
-            in_ring = ring.inverse().apply(points)
+            in_ring = to_ring.apply(points)
             return WatchedPoints(names, in_ring, in_ring)
     joints = getattr(fixator, moving).joints_mm
     names = (
         f"centre of the {moving} ring",
         *(f"joint {k} of the {moving} ring" for k in range(1, 7)),
     )
+    interest = None
+    if fracture_lps_mm is not None:
+        interest = to_ring.apply(np.asarray(fracture_lps_mm, float)[None])
     return WatchedPoints(names, np.vstack([np.zeros(3), joints]), interest)
 
 
@@ -161,6 +160,14 @@ class RigidPath:
     def poses(self, s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotations (S, 3, 3) and positions (S, 3), mm, of {A} in {B} at path parameters s."""
         return _screw(self.start, self.twist, np.atleast_1d(np.asarray(s, float)))
+
+    @cached_property
+    def interest_mm(self) -> NDArray[np.float64]:
+        """Where an error of rounding counts, in the moving ring's frame, shape (Q, 3), mm."""
+        if self.watched.interest_mm is not None:
+            return self.watched.interest_mm
+        ring = self.start if self.moving == "proximal" else self.start.inverse()
+        return 0.5 * ring.inverse().position_mm[None]
 
     def in_proximal(self, points_mm: NDArray[np.float64], s: ArrayLike) -> NDArray[np.float64]:
         """Points of the moving ring's frame in {A} at path parameters s, shape (S, P, 3), mm."""

@@ -151,7 +151,7 @@ def make_schedule(
     rounded = round_rows(
         rotations=rotations,
         positions_mm=positions,
-        interest_in_a_mm=path.in_proximal(path.watched.interest_mm, s),
+        interest_in_a_mm=path.in_proximal(path.interest_mm, s),
         fixator=fixator,
         step_mm=rules.strut_step_mm,
         watched_in_a_mm=watched,
