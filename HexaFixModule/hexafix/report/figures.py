@@ -31,15 +31,15 @@ def badge(canvas: Canvas, at: Any, strut: int, radius: float = 3.4) -> None:
 def layout_rose(document: Mapping[str, Any], ring: str) -> str:
     """The balls of a ring around its axis, seen from +z, with the included angles (SVG)."""
     sites = document["case"]["markers"][ring]
-    canvas = Canvas(62, 62)
-    middle, reach = np.array([31.0, 31.0]), 19.0
+    canvas = Canvas(66, 52)
+    middle, reach = np.array([30.0, 27.0]), 19.0
     largest = max(site["radius_mm"] for site in sites)
     colour = RING_COLOURS[ring]
     canvas.circle(middle, reach, fill="none", stroke=colour, stroke_width=1.4, opacity=0.45)
-    canvas.line(middle, middle + [reach + 2, 0], stroke=INK, stroke_width=0.35)
-    canvas.text(middle + [reach + 3, 1.1], "x front", size_mm=2.7, fill=INK)
-    canvas.line(middle, middle - [0, reach + 2], stroke=FAINT, stroke_width=0.3)
-    canvas.text(middle - [0, reach + 3], "y", size_mm=2.7, fill=INK, text_anchor="middle")
+    canvas.line(middle, middle + [reach + 5, 0], stroke=INK, stroke_width=0.35)
+    canvas.text(middle + [reach + 5.6, 1.0], "x front", size_mm=2.7, fill=INK)
+    canvas.line(middle, middle - [0, reach + 5], stroke=FAINT, stroke_width=0.3)
+    canvas.text(middle - [-1.5, reach + 4], "y", size_mm=2.7, fill=INK)
     sweeps = sorted(float(site["sweep_deg"]) % 360 for site in sites)
     for this, following in zip(sweeps, [*sweeps[1:], sweeps[0] + 360], strict=True):
         half = np.radians((this + following) / 2)
@@ -107,10 +107,12 @@ def _axes(canvas: Canvas, box: Any, y_range: Any, last_day: float) -> None:
     left, top, wide, high = box
     center, span = y_range
     canvas.rectangle((left, top), wide, high, fill="#fbfcfd", stroke=FAINT, stroke_width=0.2)
-    for share in (-0.4, 0.0, 0.4):
-        y = top + high / 2 - share * high
+    step = next((s for s in (0.5, 1, 2, 5, 10, 20, 50) if span / s <= 4), 100)
+    first = int(np.ceil((center - span / 2) / step))
+    for mark in range(first, int((center + span / 2) // step) + 1):
+        y = top + high / 2 - (mark * step - center) / span * high
         canvas.line((left, y), (left + wide, y), stroke="#d8dee4", stroke_width=0.2)
-        words = format_number(center + share * span, 1)
+        words = format_number(mark * step, 1 if step < 1 else 0)
         canvas.text((left - 0.8, y + 0.8), words, size_mm=2.3, fill=INK, text_anchor="end")
     for share in (0.0, 0.5, 1.0):
         words = ("day " if share == 0 else "") + format_number(share * last_day, 0)
@@ -148,6 +150,7 @@ def _map_ring(canvas: Canvas, view: View, scene: SceneGeometry) -> None:
 def _map_words(canvas: Canvas, view: View) -> None:
     middle = np.array([view.width_mm, view.height_mm]) / 2
     for word, towards in view.words().items():
-        at = middle + towards * (view.width_mm / 2 - 13.0) + [0, 5]
-        style = {"text_anchor": "middle", "font_weight": "bold", "fill": INK}
-        canvas.text(at, word.upper(), size_mm=15.0, **style)
+        sideways = abs(towards[0]) > 0.5
+        at = middle + towards * (middle - [2.0, 9.0]) + [0, 5]
+        anchor = "middle" if not sideways else "end" if towards[0] > 0 else "start"
+        canvas.label(at, word.upper(), size_mm=15.0, fill=INK, text_anchor=anchor)

@@ -51,7 +51,9 @@ def format_measure(value: float | None) -> str:
     if value is None:
         return "-"
     magnitude = abs(float(value))
-    if 0.0 < magnitude < 1e-3:
+    if magnitude == 0.0:
+        return "0"
+    if magnitude < 1e-3:
         return f"{float(value):.1e}"
     digits = next((d for d, top in enumerate((1e3, 1e2, 1e1, 1.0)) if magnitude >= top), 4)
     return format_number(value, digits)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.report.figures import FAINT, INK, PAPER, badge
-from hexafix.report.scene import SceneGeometry, View, transform
+from hexafix.report.scene import ANATOMY, SceneGeometry, View, transform
 from hexafix.report.svg import Canvas
 from hexafix.report.words import RING_COLOURS, STRUT_COLOURS
 
@@ -43,23 +43,44 @@ class _Places:
 
 
 def draw_labels(canvas: Canvas, view: View, scene: SceneGeometry) -> None:
-    """Strut numbers, ball numbers, ring names and front marks, patient words and a scale bar."""
-    balls = [view.project(ball.center_mm) for ball in scene.balls]
-    places = _Places(view, balls)
+    """Strut numbers, ball numbers, ring letters and front marks, patient words and a scale bar."""
     _front_marks(canvas, view, scene)
+    letters = _ring_letters(canvas, view, scene)
+    balls = [view.project(ball.center_mm) for ball in scene.balls]
+    places = _Places(view, [*balls, *letters])
     _strut_badges(canvas, view, scene, places)
     _ball_labels(canvas, view, scene, places)
-    _ring_names(canvas, view, scene)
-    middle = np.array([view.width_mm, view.height_mm]) / 2
-    for word, towards in view.words().items():
-        at = middle + towards * (middle - [12.0, 6.0]) + [0, 3.0]
-        anchor = "middle" if abs(towards[0]) < 0.5 else "end" if towards[0] > 0 else "start"
-        at = at + [0.0 if anchor == "middle" else 10.0 * np.sign(towards[0]), 0.0]
-        style = {"text_anchor": anchor, "font_weight": "bold", "fill": INK}
-        canvas.text(at, word.upper(), size_mm=9.0, **style)
+    if view.is_along_patient_axis:
+        _edge_words(canvas, view)
+    else:
+        _triad(canvas, view)
     end = np.array([view.width_mm - 6.0, view.height_mm - 5.0])
     canvas.line(end - [50.0, 0], end, stroke=INK, stroke_width=1.2, stroke_linecap="butt")
-    canvas.text(end - [25.0, 2.5], "50 mm", size_mm=7.0, fill=INK, text_anchor="middle")
+    canvas.label(end - [25.0, 2.5], "50 mm", size_mm=7.0, fill=INK, text_anchor="middle")
+
+
+def _edge_words(canvas: Canvas, view: View) -> None:
+    """The patient's directions at the four edges of a view along a patient axis."""
+    middle = np.array([view.width_mm, view.height_mm]) / 2
+    for word, towards in view.words().items():
+        sideways = abs(towards[0]) > 0.5
+        at = middle + towards * (middle - [4.0, 6.0]) + [0, 3.0]
+        anchor = "middle" if not sideways else "end" if towards[0] > 0 else "start"
+        canvas.label(at, word.upper(), size_mm=9.0, fill=INK, text_anchor=anchor)
+
+
+def _triad(canvas: Canvas, view: View) -> None:
+    """Three arrows with the patient's directions in the lower left corner of an oblique view."""
+    base = np.array([44.0, view.height_mm - 34.0])
+    for word in ("head", "front", "left" if view.right[0] > 0 else "right"):
+        direction = np.array(ANATOMY[word])
+        flat = np.array([direction @ view.right, -(direction @ view.up)])
+        tip = base + 22.0 * flat
+        canvas.line(base, tip, stroke=INK, stroke_width=1.2)
+        at = base + 22.0 * flat + 6.0 * flat / np.linalg.norm(flat) + [0, 2.2]
+        anchor = "middle" if abs(flat[0]) < 0.4 else "start" if flat[0] > 0 else "end"
+        canvas.label(at, word.upper(), size_mm=7.5, fill=INK, text_anchor=anchor)
+    canvas.circle(base, 1.6, fill=INK)
 
 
 def _strut_badges(canvas: Canvas, view: View, scene: SceneGeometry, places: _Places) -> None:
@@ -88,15 +109,17 @@ def _ball_labels(canvas: Canvas, view: View, scene: SceneGeometry, places: _Plac
         canvas.text(at + [0, 0.36 * size], str(ball.number), size_mm=size, **style)
 
 
-def _ring_names(canvas: Canvas, view: View, scene: SceneGeometry) -> None:
-    for ring in RINGS:
+def _ring_letters(canvas: Canvas, view: View, scene: SceneGeometry) -> list[NDArray[np.float64]]:
+    """A at the proximal and B at the distal ring, left of its rim; returns where they stand."""
+    taken = []
+    for ring, letter in (("proximal", "A"), ("distal", "B")):
         outline = view.project(scene.outline_mm(ring, scene.ring(ring).outer_radius_mm, 0.0))
-        at = outline[int(np.argmin(outline[:, 0])), :2]
-        name = "{A} proximal" if ring == "proximal" else "{B} distal"
-        lift = -14.0 if ring == "proximal" else 22.0
-        place = (max(4.0, float(at[0]) - 18.0), float(at[1]) + lift)
-        style = {"font_weight": "bold", "fill": RING_COLOURS[ring]}
-        canvas.text(place, name, size_mm=8.0, **style)
+        rim = outline[int(np.argmin(outline[:, 0])), :2]
+        at = rim + [-9.0, 4.5]
+        style = {"text_anchor": "middle", "fill": RING_COLOURS[ring]}
+        canvas.label(at, letter, size_mm=13.0, **style)
+        taken.append(at - [0.0, 4.5])
+    return taken
 
 
 def _front_marks(canvas: Canvas, view: View, scene: SceneGeometry) -> None:
@@ -112,11 +135,12 @@ def _front_marks(canvas: Canvas, view: View, scene: SceneGeometry) -> None:
             continue
         along = arrow / length
         across = np.array([-along[1], along[0]])
+        canvas.line(base[:2], tip[:2] - 4 * along, stroke=PAPER, stroke_width=2.6)
         canvas.line(base[:2], tip[:2] - 4 * along, stroke=colour, stroke_width=1.3)
-        head = [tip[:2], tip[:2] - 7 * along + 2.6 * across, tip[:2] - 7 * along - 2.6 * across]
-        canvas.path([head], closed=True, fill=colour)
-        style = {"font_weight": "bold", "fill": colour, "text_anchor": "middle"}
-        canvas.text(tip[:2] - 20 * along + [0, -2.5], "x front", size_mm=6.0, **style)
+        head = [tip[:2], tip[:2] - 8 * along + 3.2 * across, tip[:2] - 8 * along - 3.2 * across]
+        canvas.path([head], closed=True, fill=colour, stroke=PAPER, stroke_width=0.5)
+        at = base[:2] + 0.55 * arrow + [0, -3.0]
+        canvas.label(at, "x", size_mm=8.0, fill=colour, text_anchor="middle")
 
 
 def draw_scene(canvas: Canvas, view: View, scene: SceneGeometry) -> None:

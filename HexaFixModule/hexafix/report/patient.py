@@ -11,7 +11,7 @@ from typing import Any
 from hexafix.report import words
 from hexafix.report.format import format_change, format_row, parse_date
 
-ROWS_PER_PAGE = 30
+ROWS_PER_PAGE = 32
 """Rows of the large table on one page, a day's heading counted as one."""
 
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")

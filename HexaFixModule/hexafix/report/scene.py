@@ -182,6 +182,11 @@ class View:
         v = self.height_mm / 2 - offset @ self.up
         return np.stack([u, v, offset @ self.toward], axis=-1)
 
+    @property
+    def is_along_patient_axis(self) -> bool:
+        """Whether the view looks along L, P or S, to 5 degrees."""
+        return float(np.max(np.abs(self.toward))) > 0.996
+
     def words(self, threshold: float = 0.7) -> dict[str, NDArray[np.float64]]:
         """Anatomical words near the picture plane with their unit direction (u, v) on the page."""
         found = {}
@@ -239,7 +244,7 @@ def view_from_above(scene: SceneGeometry) -> View:
     up = min(lean, key=lambda direction: abs(float(direction @ axis)))
     right, up, toward = _axes(axis, lean[0] if abs(float(lean[0] @ axis)) < 0.7 else up)
     radius = scene.fixator.proximal.outer_radius_mm
-    size = 2 * radius + 90.0
+    size = 2 * radius + 130.0
     middle = scene.proximal_lps[:3, 3]
     return View("above", "Seen from above", right, up, toward, middle, size, size)
 
