@@ -60,11 +60,23 @@ class Crop:
         plane = (j * a[:3, 1])[:, None] + (i * a[:3, 0])[None]
         return (first + k * a[:3, 2])[:, None, None] + plane
 
-    def core(self, center_mm: NDArray[np.float64], reach_mm: float) -> tuple[float, float]:
-        """Median HU within a distance of a point, LPS mm, and robust standard deviation."""
+    def core(self, center_mm: NDArray[np.float64], reach_mm: float) -> tuple[float, float, float]:
+        """HU within a distance of a point, LPS mm.
+
+        Returns
+        -------
+        tuple of float
+            Median, robust standard deviation, and share at the crop's greatest value.
+        """
         away = self.points_mm - center_mm
         values = self.voxels[np.einsum("...i,...i", away, away) < reach_mm**2]
         if not len(values):
-            return float("nan"), 0.0
+            return float("nan"), 0.0, 0.0
         middle = float(np.median(values))
-        return middle, 1.4826 * float(np.median(np.abs(values - middle)))
+        noise = 1.4826 * float(np.median(np.abs(values - middle)))
+        return middle, noise, float(np.mean(values >= self.brightest))
+
+    @cached_property
+    def brightest(self) -> float:
+        """The greatest value of the crop."""
+        return float(self.voxels.max())

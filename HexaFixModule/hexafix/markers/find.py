@@ -14,7 +14,7 @@ from hexafix.markers.ball import Ball, BallSet, Rejected
 from hexafix.markers.crop import Crop
 from hexafix.markers.directions import sphere_directions
 from hexafix.markers.model import ModelFit, fit_model
-from hexafix.markers.rays import DIRECTIONS, RayFit, fit_rays
+from hexafix.markers.rays import DIRECTIONS, RayFit, fine_fit, rough_fit
 from hexafix.markers.search import candidate_centers
 from hexafix.markers.uncertainty import centre_covariance
 from hexafix.progress import Progress, silent
@@ -28,6 +28,11 @@ DISAGREEMENT_MM = 0.06
 MOST_LOCAL = 96
 """At most so many candidates are fitted."""
 SURROUND_MM = 4.5
+"""What is cut out around a ball, beyond its radius."""
+ROUGH_SLACK = 2.0
+"""Factor on the limits of shape while the fit is rough."""
+MOST_LISTED = 40
+"""At most so many rejected candidates are listed, the roundest first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,60 +105,67 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
     if reason is not None:
         return Rejected(point, reason)
     crop = Crop.around(volume, point, radius + SURROUND_MM)
-    rays = fit_rays(crop, point, radius)
-    if rays is None or np.linalg.norm(rays.center_mm - point) > 0.8 * radius:
+    rough = rough_fit(crop, point, radius)
+    if rough is None or np.linalg.norm(rough.center_mm - point) > 0.8 * radius:
+        return None
+    reasons = _shape(volume, rough, rough.radius_mm, radius, slack=ROUGH_SLACK)
+    if reasons:
+        return Rejected(rough.center_mm, "; ".join(reasons))
+    rays = fine_fit(crop, rough, radius)
+    if rays is None:
         return None
     reason = predicates.border_failure(volume, rays.center_mm, radius)
     if reason is not None:
         return Rejected(rays.center_mm, reason)
-    top = float(crop.voxels.max())
-    clipped = _clipped_share(crop, rays, radius, top)
-    clip_hu = top if clipped > 0.02 else None
+    clipped = rays.clipped_share > predicates.CLIPPED_CORE
     thick = float(volume.spacing_mm.max()) > THICK_SLICES_MM
-    cut = sphere_directions(DIRECTIONS)[rays.cut]
-    model = fit_model(crop, rays.center_mm, radius, cut=cut, clip_hu=clip_hu, all_voxels=thick)
-    fitted = rays.radius_mm if model is None or clip_hu is not None else model.radius_mm
-    reasons = [
-        *predicates.shape_failures(
-            volume, rays, fitted_mm=fitted, radius_mm=radius, clipped=clip_hu is not None
-        ),
+    model = fit_model(
+        crop,
+        rays.center_mm,
+        radius,
+        cut=sphere_directions(DIRECTIONS)[rays.cut],
+        clip_hu=crop.brightest if clipped else None,
+        all_voxels=thick,
+    )
+    fitted = rays.radius_mm if model is None or clipped else model.radius_mm
+    reasons = _shape(volume, rays, fitted, radius)
+    reasons += [
         *predicates.model_failures(model, rays),
+        *predicates.stem_failures(crop, rays, radius),
     ]
-    stem = predicates.stem_failure(crop, rays, radius)
-    reasons += [stem] if stem else []
     if reasons:
         return Rejected(rays.center_mm, "; ".join(reasons))
-    ball = _ball(rays, model, fitted, thick=thick, clipped=clipped)
+    ball = _ball(rays, model, fitted, thick=thick)
     return _Fitted(ball, rays.core_hu - rays.outside_hu)
 
 
-def _clipped_share(crop: Crop, rays: RayFit, radius: float, top: float) -> float:
-    """Share of the ball's voxels at the greatest value around."""
-    inside = np.linalg.norm(crop.points_mm - rays.center_mm, axis=-1) < 0.8 * radius
-    return float(np.mean(crop.voxels[inside] >= top)) if inside.any() else 0.0
+def _shape(
+    volume: Volume, rays: RayFit, fitted: float, radius: float, slack: float = 1.0
+) -> list[str]:
+    return list(
+        predicates.shape_failures(volume, rays, fitted_mm=fitted, radius_mm=radius, slack=slack)
+    )
 
 
-def _ball(
-    rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool, clipped: float
-) -> Ball:
+def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -> Ball:
     """The value, with its covariance and what the user should look at."""
-    by_model = thick and model is not None
-    center = model.center_mm if by_model and model is not None else rays.center_mm
+    center, method = rays.center_mm, "gradient-rays"
     covariance = centre_covariance(rays, model)
     warnings = []
-    if clipped > CLIPPED_SHARE:
+    if rays.clipped_share > CLIPPED_SHARE:
         warnings.append(
-            f"{clipped:.0%} of the ball is clipped (limit {CLIPPED_SHARE:.0%}): "
-            "fitted by its edges only (H11)"
+            f"{rays.clipped_share:.0%} of the ball's core is clipped (limit {CLIPPED_SHARE:.0%}): "
+            "fitted by its edges, its diameter looks too large (H11)"
         )
     if model is not None:
         apart = float(np.linalg.norm(model.center_mm - rays.center_mm))
         if apart > max(DISAGREEMENT_MM, 4.0 * float(np.sqrt(np.trace(covariance)))):
             warnings.append(f"the two fits of this ball lie {apart:.2f} mm apart")
+        if thick:
+            center, method = model.center_mm, "model-fit"
     return Ball(
-        center, 2.0 * fitted, covariance, rays.rms_mm, rays.core_hu,
-        "model-fit" if by_model else "gradient-rays", tuple(warnings),
-    )  # fmt: skip
+        center, 2.0 * fitted, covariance, rays.rms_mm, rays.core_hu, method, tuple(warnings)
+    )
 
 
 def _apart(fitted: list[_Fitted], radius: float) -> tuple[list[_Fitted], list[Rejected]]:
@@ -204,7 +216,7 @@ def _distinct(
         if all(np.linalg.norm(one.center_mm - place) > 0.8 * radius for place in places):
             places.append(one.center_mm)
             listed.append(replace(one, center_mm=np.asarray(one.center_mm)))
-    return tuple(listed)
+    return tuple(listed[:MOST_LISTED])
 
 
 def _warnings(volume: Volume, balls: tuple[Ball, ...], candidates: int) -> tuple[str, ...]:

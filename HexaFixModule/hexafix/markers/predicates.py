@@ -16,9 +16,11 @@ from hexafix.markers.rays import DIRECTIONS, RayFit
 BORDER_MM = 0.75
 """The ball's surface lies at least this far inside the volume (and at least a voxel)."""
 RADIUS_MM = 0.15
-"""Fitted radius against the nominal one; see `radius_limits`."""
+"""Fitted radius against the nominal one, at voxels up to 0.7 mm."""
 CLIPPED_GROWTH_MM = 0.75
 """How much larger a ball looks when its voxels are clipped."""
+CLIPPED_CORE = 0.02
+"""Share of clipped voxels in the core from which a ball counts as clipped."""
 ROUGHNESS_MM = 0.10
 """RMS distance of the edges from the sphere, at voxels up to 1 mm."""
 EDGE_SHARE = 0.80
@@ -48,27 +50,32 @@ def border_failure(volume: Volume, center_mm: NDArray[np.float64], radius_mm: fl
     return f"border: {distance:.1f} mm from the edge of the volume, limit {limit:.1f} mm"
 
 
-def radius_limits(volume: Volume, *, clipped: bool) -> tuple[float, float]:
-    """Least and greatest fitted minus nominal radius, mm."""
-    coarse = 0.06 * max(0.0, float(volume.spacing_mm.max()) - 0.7)
-    wide = RADIUS_MM + coarse
-    return -wide, wide + (CLIPPED_GROWTH_MM if clipped else 0.0)
-
-
 def shape_failures(
-    volume: Volume, rays: RayFit, *, fitted_mm: float, radius_mm: float, clipped: bool
+    volume: Volume, rays: RayFit, *, fitted_mm: float, radius_mm: float, slack: float = 1.0
 ) -> Iterator[str]:
-    """Reasons of size and shape."""
-    low, high = radius_limits(volume, clipped=clipped)
-    if not low <= fitted_mm - radius_mm <= high:
-        yield (
-            f"radius: {fitted_mm:.2f} mm, limit {radius_mm + low:.2f} to {radius_mm + high:.2f} mm"
-        )
-    rough = ROUGHNESS_MM * max(1.0, float(volume.spacing_mm.max()))
+    """Reasons of size and shape.
+
+    Parameters
+    ----------
+    volume : Volume
+    rays : RayFit
+    fitted_mm, radius_mm : float
+        The fitted radius and the nominal one.
+    slack : float
+        Factor on the limits; a rough fit is given more than 1.
+    """
+    thickest = float(volume.spacing_mm.max())
+    wide = slack * (RADIUS_MM + 0.06 * max(0.0, thickest - 0.7))
+    low, high = radius_mm - wide, radius_mm + wide
+    high += CLIPPED_GROWTH_MM if rays.clipped_share > CLIPPED_CORE else 0.0
+    if not low <= fitted_mm <= high:
+        yield f"radius: {fitted_mm:.2f} mm, limit {low:.2f} to {high:.2f} mm"
+    rough = slack * ROUGHNESS_MM * max(1.0, thickest)
     if rays.rms_mm > rough:
         yield f"sphericity: surface RMS {rays.rms_mm:.3f} mm, limit {rough:.3f} mm"
-    if rays.edge_share < EDGE_SHARE:
-        yield f"edges: {rays.edge_share:.0%} of the surface, limit {EDGE_SHARE:.0%}"
+    least = EDGE_SHARE / slack
+    if rays.edge_share < least:
+        yield f"edges: {rays.edge_share:.0%} of the surface, limit {least:.0%}"
     if rays.cut_share > CUT_SHARE:
         yield f"hidden: {rays.cut_share:.0%} of the surface by metal, limit {CUT_SHARE:.0%}"
 
@@ -85,7 +92,7 @@ def model_failures(model: ModelFit | None, rays: RayFit) -> Iterator[str]:
         yield f"residual: {model.rms_hu:.0f} HU, limit {limit:.0f} HU"
 
 
-def stem_failure(crop: Crop, rays: RayFit, radius_mm: float) -> str | None:
+def stem_failures(crop: Crop, rays: RayFit, radius_mm: float) -> Iterator[str]:
     """Reason when a metal stem grows out of the ball, as on a strut's ball joint.
 
     A marker's own rod is far less dense than the ball; a ring or a neighbouring ball is wider.
@@ -93,28 +100,16 @@ def stem_failure(crop: Crop, rays: RayFit, radius_mm: float) -> str | None:
     directions = sphere_directions(DIRECTIONS)
     half = rays.outside_hu + 0.5 * (rays.core_hu - rays.outside_hu)
     if rays.shell_hu.max() < half:
-        return None
-    patches = []
+        return
+    width, axes = 0.0, []
     for distance in (radius_mm + 2.0, radius_mm + 3.5):
-        values = crop.sample(rays.center_mm + distance * directions)
-        patches.append(neighbour_average(DIRECTIONS, 0.08) @ values > half)
-    near, far = patches
-    if near.mean() < 0.005 or far.mean() < 0.002:
-        return None
-    axis = directions[near].sum(axis=0)
-    axis /= np.linalg.norm(axis)
-    if directions[far].sum(axis=0) @ axis < 0.95 * np.linalg.norm(directions[far].sum(axis=0)):
-        return None
-    width = 0.0
-    for patch, distance in ((near, radius_mm + 2.0), (far, radius_mm + 3.5)):
-        spread = np.sqrt(max(0.0, 1.0 - float(np.min(directions[patch] @ axis)) ** 2))
-        if np.min(directions[patch] @ axis) < 0.3:
-            return None
-        width = max(width, distance * spread)
+        values = crop.sample(rays.center_mm + distance * directions, order=1)
+        patch = directions[neighbour_average(DIRECTIONS, 0.08) @ values > half]
+        if len(patch) < 2:
+            return
+        axes.append(patch.sum(axis=0) / np.linalg.norm(patch.sum(axis=0)))
+        cosine = float(np.min(patch @ axes[-1]))
+        width = max(width, distance * np.sqrt(1.0 - min(cosine, 1.0) ** 2) if cosine > 0.3 else 1e9)
     limit = 0.8 * radius_mm
-    if width > limit:
-        return None
-    return (
-        f"rod: a stem as dense as the ball, {width:.1f} mm in radius, "
-        f"limit: no metal narrower than {limit:.1f} mm"
-    )
+    if width < limit and axes[0] @ axes[1] > 0.95:
+        yield f"rod: a stem as dense as the ball, {width:.1f} mm in radius, limit {limit:.1f} mm"

@@ -14,8 +14,9 @@ from hexafix.markers.crop import Crop
 from hexafix.markers.directions import neighbour_average, sphere_directions
 
 DIRECTIONS = 600
-PASSES = ((200, 1.75), (DIRECTIONS, 1.0))
-"""Directions and greatest distance of an edge from the radius, mm, of the two passes."""
+ROUGH, FINE = (200, 1.75), (DIRECTIONS, 1.0)
+"""Directions, and greatest distance of an edge from the radius in mm, of the two passes."""
+MOST_PASSES = 3
 SETTLED_MM = 0.05
 """A longer last step asks for one more pass."""
 STEP_MM = 0.25
@@ -61,6 +62,8 @@ class RayFit:
         Mean brightness outside the ball.
     core_noise_hu : float
         Robust standard deviation of the HU inside.
+    clipped_share : float
+        Share of the core at the greatest value of the crop.
     """
 
     center_mm: NDArray[np.float64]
@@ -76,6 +79,7 @@ class RayFit:
     edge_share: float
     shell_hu: NDArray[np.float64]
     core_noise_hu: float
+    clipped_share: float
 
 
 def half_sample_mode(values: NDArray[np.float64]) -> float:
@@ -89,8 +93,8 @@ def half_sample_mode(values: NDArray[np.float64]) -> float:
     return float(data.mean())
 
 
-def fit_rays(crop: Crop, start_mm: NDArray[np.float64], radius_mm: float) -> RayFit | None:
-    """Fit a sphere of about the given radius; None when too few rays have an edge.
+def rough_fit(crop: Crop, start_mm: NDArray[np.float64], radius_mm: float) -> RayFit | None:
+    """A quick first sphere of about the given radius; None when too few rays have an edge.
 
     Parameters
     ----------
@@ -100,18 +104,17 @@ def fit_rays(crop: Crop, start_mm: NDArray[np.float64], radius_mm: float) -> Ray
     radius_mm : float
         Nominal radius.
     """
-    center, radius = np.asarray(start_mm, float), radius_mm
-    for count, window in PASSES:
-        fit = _one_pass(crop, center, radius, radius_mm, count=count, window=window)
-        if fit is None:
-            return None
-        moved = float(np.linalg.norm(fit.center_mm - center))
-        center, radius = fit.center_mm, fit.radius_mm
-    return (
-        fit
-        if moved < SETTLED_MM
-        else _one_pass(crop, center, radius, radius_mm, count=count, window=window)
-    )
+    return _one_pass(crop, start_mm, radius_mm, radius_mm, fine=False)
+
+
+def fine_fit(crop: Crop, rough: RayFit, radius_mm: float) -> RayFit | None:
+    """The sphere through all rays, from a rough one; arguments as in `rough_fit`."""
+    before, fit = rough, _one_pass(crop, rough.center_mm, rough.radius_mm, radius_mm, fine=True)
+    for _ in range(MOST_PASSES - 1):
+        if fit is None or np.linalg.norm(fit.center_mm - before.center_mm) < SETTLED_MM:
+            break
+        before, fit = fit, _one_pass(crop, fit.center_mm, fit.radius_mm, radius_mm, fine=True)
+    return fit
 
 
 def _one_pass(
@@ -120,16 +123,16 @@ def _one_pass(
     radius: float,
     nominal: float,
     *,
-    count: int,
-    window: float,
+    fine: bool,
 ) -> RayFit | None:
-    """Rays from one centre, edges within `window` of a radius, and the sphere through them."""
+    """Rays from one centre, edges near a radius, and the sphere through them."""
+    count, window = FINE if fine else ROUGH
     directions = sphere_directions(count)
     half = HALF_KERNEL + round(window / STEP_MM)
     distance = radius + STEP_MM * np.arange(-half, half + 1)
     distance = distance[distance > 0.1 * radius]
     profile = crop.sample(center + directions[:, None, :] * distance[:, None])
-    core_hu, core_noise = crop.core(center, 0.6 * nominal)
+    core_hu, core_noise, clipped = crop.core(center, 0.6 * nominal)
     away = nominal + SHELL_MM[:, None, None]
     shell = crop.sample(center + directions * away, order=1).mean(axis=0)
     outside = half_sample_mode(shell)
@@ -154,6 +157,7 @@ def _one_pass(
         edge_share=float((weight > 0).sum() / max(1, (~cut).sum())),
         shell_hu=shell,
         core_noise_hu=core_noise,
+        clipped_share=clipped,
     )
 
 

@@ -22,9 +22,9 @@ BRIGHT_LITRES = 1.6
 """The first look takes in the brightest matter of the volume up to this amount."""
 DARK_SHARE = 0.55
 """Least share of directions in which the brightness has fallen to half outside a ball."""
-ROUNDS = ((32, 0.9, 0.30), (64, 0.50, 0.45), (64, 0.35, 0.50))
+ROUNDS = ((32, 0.9, 0.35), (64, 0.50, 0.50), (64, 0.35, 0.65))
 """Rounds of rays: how many, share of the radius by which a crossing may miss, least hits."""
-ON_SPHERE = 0.12
+ON_SPHERE = 0.10
 """A hit lies this share of the radius from the fitted sphere."""
 CHUNK = 16_384
 """Places polled at a time; bounds the memory."""
