@@ -53,7 +53,9 @@ def recognition_text(document: dict[str, Any]) -> str:
         lines += _pose_lines(pose)
     lines.append("mechanism, proximal ring in the distal ring")
     lines += _pose_lines(document["mechanism"])
-    return "\n".join([*lines, *_gates(document["gates"]), *_warnings(document["image"]["warnings"])])
+    return "\n".join(
+        [*lines, *_gates(document["gates"]), *_warnings(document["image"]["warnings"])]
+    )
 
 
 def _pose_lines(pose: dict[str, Any]) -> list[str]:
@@ -102,7 +104,8 @@ def plan_text(document: dict[str, Any], folder: Path) -> str:
         f"{schedule['days']} days, {schedule['adjustments_per_day']} adjustments a day; ruled by "
         f"{schedule['ruling_point']}",
         "final strut values  " + "  ".join(f"{value:g}" for value in last["strut_mm"]),
-        f"rounding leaves {schedule['end_error_mm']:.3f} mm and {schedule['end_error_deg']:.3f} deg",
+        f"rounding leaves {schedule['end_error_mm']:.3f} mm and "
+        f"{schedule['end_error_deg']:.3f} deg",
         *_gates(document["gates"]),
         *_warnings(document["image"]["warnings"]),
         f"approval: {document['approval']}. Research software, not a medical device.",

@@ -96,11 +96,13 @@ def recognise(case: Case, volume: Volume, *, progress: Progress = silent) -> Rec
     progress("number the balls", 0.0)
     numbering = _number(case, balls)
     progress("number the balls", 1.0)
-    poses = {
-        (side, method): method(*_measured(balls, layout, numbering), **_covariances(balls, layout, numbering))
-        for side, layout in (("proximal", case.proximal), ("distal", case.distal))
-        for method in (ring_pose, ring_pose_by_groups)
-    }  # fmt: skip
+    poses = {}
+    for side, layout in (("proximal", case.proximal), ("distal", case.distal)):
+        chosen = _of_layout(layout, numbering)
+        points = balls.centers_mm[chosen]
+        covariances = np.array([balls.balls[index].covariance_mm2 for index in chosen])
+        for method in (ring_pose, ring_pose_by_groups):
+            poses[side, method] = method(points, layout, covariances_mm2=covariances)
     proximal, distal = poses["proximal", ring_pose], poses["distal", ring_pose]
     mechanism = mechanism_pose(proximal=proximal, distal=distal)
     return Recognised(
@@ -154,17 +156,6 @@ def _of_layout(layout: MarkerLayout, numbering: Numbering) -> list[int]:
     """Ball indices in the order of the layout's sites."""
     ball = numbering.ball_of_number
     return [ball[number] for number in layout.numbers]
-
-
-def _measured(
-    balls: BallSet, layout: MarkerLayout, numbering: Numbering
-) -> tuple[np.ndarray, MarkerLayout]:
-    return balls.centers_mm[_of_layout(layout, numbering)], layout
-
-
-def _covariances(balls: BallSet, layout: MarkerLayout, numbering: Numbering) -> dict[str, Any]:
-    chosen = [balls.balls[index].covariance_mm2 for index in _of_layout(layout, numbering)]
-    return {"covariances_mm2": np.array(chosen)}
 
 
 def _gates(

@@ -1,0 +1,141 @@
+"""4×4 matrices by `scipy.linalg` and poses by `scipy.optimize`: the other road."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, logm
+from scipy.optimize import least_squares
+from scipy.spatial.transform import RigidTransform, Rotation
+
+Matrix = NDArray[np.float64]
+INSTALLATION_SIGMA_MM = 0.4 / 6
+"""Installation error of a marker per axis. Source: Section 4.3."""
+
+
+def angle_deg(one: Matrix, other: Matrix) -> float:
+    """Angle between the axes of two 4×4 poses, degrees."""
+    turn = Rotation.from_matrix(one[:3, :3].T @ other[:3, :3])
+    return float(np.degrees(turn.magnitude()))
+
+
+def distance_mm(one: Matrix, other: Matrix) -> float:
+    """Distance of the origins of two 4×4 poses, mm."""
+    return float(np.linalg.norm(one[:3, 3] - other[:3, 3]))
+
+
+def angles_deg(pose: Matrix) -> NDArray[np.float64]:
+    """X-Y-Z fixed angles of a 4×4 pose, degrees, by scipy."""
+    return Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True)
+
+
+def layout_points(markers: list[dict[str, float]]) -> NDArray[np.float64]:
+    """Marker places in the ring frame, shape (N, 3), mm, as complex numbers in the plane."""
+    place = np.array([m["radius_mm"] for m in markers]) * np.exp(
+        1j * np.radians([m["sweep_deg"] for m in markers])
+    )
+    return np.stack([place.real, place.imag, [m["height_mm"] for m in markers]], axis=-1)
+
+
+def ring_pose(places: Matrix, centers: Matrix, covariances: Matrix) -> Matrix:
+    """Ring pose in LPS by minimising whitened distances.
+
+    Parameters
+    ----------
+    places : ndarray, shape (N, 3)
+        Ring frame, mm.
+    centers : ndarray, shape (N, 3)
+        Ball centres, LPS mm.
+    covariances : ndarray, shape (N, 3, 3)
+        Of the centres, LPS mm².
+    """
+    total = covariances + INSTALLATION_SIGMA_MM**2 * np.eye(3)
+    whiten = np.linalg.inv(np.linalg.cholesky(total))
+    middle_place, middle = places.mean(axis=0), centers.mean(axis=0)
+    start, _ = Rotation.align_vectors(centers - middle, places - middle_place)
+
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        turn = Rotation.from_rotvec(x[3:]) * start
+        away = turn.apply(places - middle_place) + middle + x[:3] - centers
+        return np.einsum("nij,nj->ni", whiten, away).ravel()
+
+    fit = least_squares(residual, np.zeros(6), x_scale=[1, 1, 1, 0.01, 0.01, 0.01], xtol=1e-14,
+                        ftol=1e-14, gtol=1e-14)  # fmt: skip
+    pose = np.eye(4)
+    turn = Rotation.from_rotvec(fit.x[3:]) * start
+    pose[:3, :3] = turn.as_matrix()
+    pose[:3, 3] = middle + fit.x[:3] - turn.apply(middle_place)
+    return pose
+
+
+def strut_vectors(pose: Matrix, fixator: dict[str, Any]) -> NDArray[np.float64]:
+    """From b_l to a_l in {B}, shape (6, 3), mm, by homogeneous coordinates."""
+    ones = np.ones((6, 1))
+    a = np.hstack([np.array(fixator["proximal"]["joints_mm"], float), ones]) @ pose.T
+    return a[:, :3] - np.array(fixator["distal"]["joints_mm"], float)
+
+
+def strut_lengths(pose: Matrix, fixator: dict[str, Any]) -> NDArray[np.float64]:
+    """Strut lengths of a 4×4 pose {A} in {B}, shape (6,), mm."""
+    return np.sqrt(np.sum(np.square(strut_vectors(pose, fixator)), axis=1))
+
+
+def forward(lengths: Matrix, fixator: dict[str, Any], start: Matrix) -> Matrix:
+    """Mechanism pose of six lengths by least squares on X-Y-Z angles (Eq. 30 as printed)."""
+
+    def pose_of(x: NDArray[np.float64]) -> Matrix:
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.from_euler("xyz", x[3:]).as_matrix()
+        pose[:3, 3] = x[:3]
+        return pose
+
+    first = np.concatenate([start[:3, 3], np.radians(angles_deg(start))])
+    fit = least_squares(
+        lambda x: strut_lengths(pose_of(x), fixator) - lengths,
+        first,
+        x_scale=[1, 1, 1, 0.01, 0.01, 0.01],
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
+    return pose_of(fit.x)
+
+
+def between(start: Matrix, end: Matrix, s: float) -> Matrix:
+    """The pose at s in [0, 1] on the screw from start to end, by matrix logarithm."""
+    step = np.real(logm(np.linalg.solve(start, end)))
+    return start @ expm(s * step)
+
+
+def fuse(
+    proximal: Matrix, distal: Matrix, covariance_a: Matrix, covariance_b: Matrix, struts: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Ring poses that agree with the struts' pose, as likely as possible, by `least_squares`.
+
+    Parameters
+    ----------
+    proximal, distal : ndarray, shape (4, 4)
+        Recognised, LPS.
+    covariance_a, covariance_b : ndarray, shape (6, 6)
+        Of ξ = (mm, rad) in each ring's frame.
+    struts : ndarray, shape (4, 4)
+        X_t.
+    """
+    whiten_a = np.linalg.inv(np.linalg.cholesky(covariance_a))
+    whiten_b = np.linalg.inv(np.linalg.cholesky(covariance_b))
+    scale = np.array([1, 1, 1, 0.01, 0.01, 0.01])
+
+    def exponential(xi: NDArray[np.float64]) -> Matrix:
+        return RigidTransform.from_exp_coords(np.concatenate([xi[3:], xi[:3]])).as_matrix()
+
+    def residual(xi_b: NDArray[np.float64]) -> NDArray[np.float64]:
+        moved = np.linalg.solve(proximal, distal @ exponential(xi_b) @ struts)
+        coords = RigidTransform.from_matrix(moved).as_exp_coords()
+        xi_a = np.concatenate([coords[3:], coords[:3]])
+        return np.concatenate([whiten_a @ xi_a, whiten_b @ xi_b])
+
+    fit = least_squares(residual, np.zeros(6), x_scale=scale, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    corrected = distal @ exponential(fit.x)
+    return corrected @ struts, corrected
