@@ -112,7 +112,8 @@ def ring_poses(
     -----
     Source: Eq. (6), solved for all markers at once. Departs: Kabsch start, then Gauss-Newton on
     SE(3) with each ball's weight (Rᵀ C_i R + S)⁻¹, refreshed at every step, C_i the ball's and S
-    the installation's covariance.
+    the installation's covariance. With the same S along each axis this is the minimum of χ²;
+    otherwise the weights' own change with R is left out, which is of second order in the errors.
     """
     points = np.asarray(points_mm, float)
     r = layout.points_mm
@@ -186,11 +187,11 @@ def _normal_equations(
     points: Array, r: Array, total: Array, rotation: Array, position: Array
 ) -> tuple[Array, Array, Array]:
     """JᵀWJ, JᵀWe and χ² at the present poses."""
-    x = (points - position[:, None, :]) @ rotation
+    e = (points - position[:, None, :]) @ rotation - r
     weight = np.linalg.inv(total)
-    e = x - r
-    # x moves by -ρ - θ × x when the pose moves by ξ = (ρ, θ).
-    jacobian = np.concatenate([np.broadcast_to(-np.eye(3), (*x.shape, 3)), skew(x)], axis=-1)
+    # In the image R r + p moves by R (ρ + θ × r) with ξ = (ρ, θ); here it is turned back by Rᵀ.
+    jacobian = np.concatenate([np.broadcast_to(-np.eye(3), (*r.shape, 3)), skew(r)], axis=-1)
+    jacobian = np.broadcast_to(jacobian, (len(points), *jacobian.shape))
     weighted = np.einsum("knia,knij->knaj", jacobian, weight)
     normal = np.einsum("knaj,knjb->kab", weighted, jacobian)
     gradient = np.einsum("knaj,knj->ka", weighted, e)
@@ -300,5 +301,5 @@ def refuse_mirrored(points: Array, layout: MarkerLayout) -> None:
             value=f"RMS {proper:.2f} mm as built, {mirrored:.2f} mm mirrored",
             limit=f"{RING_RMS_LIMIT_MM:g} mm as built",
             hazard="H01",
-            next_step="check the image's orientation and the signs of the layout's heights",
+            next_step="check the image's orientation, the numbering and the signs of the heights",
         )

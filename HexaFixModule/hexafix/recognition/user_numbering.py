@@ -66,9 +66,11 @@ def check_user_numbering(
         tuple(ball_of[number] for number in proximal.numbers),
         tuple(ball_of[number] for number in distal.numbers),
     )
-    for balls, layout in zip(chosen, (proximal, distal), strict=True):
-        refuse_mirrored(points[list(balls)], layout)
     found = search(points, proximal=proximal, distal=distal, noise_mm=noise_mm)
+    if len(found.rms_mm) == 0 or found.rms_mm[0] > RING_RMS_LIMIT_MM:
+        # With a fitting numbering among the choices, exchanged numbers only look like a mirror.
+        for balls, layout in zip(chosen, (proximal, distal), strict=True):
+            refuse_mirrored(points[list(balls)], layout)
     choices, row = with_choice(points, found, chosen, proximal=proximal, distal=distal)
     _refuse_worse(choices, row, noise_mm=noise_mm, proximal=proximal, distal=distal)
     return numbering_value(
