@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydicom.pixels import get_decoder, pixel_array
+from pydicom import dcmread
+from pydicom.pixels.decoders.base import get_decoder
+from pydicom.pixels.utils import pixel_array
 from pydicom.uid import UID
 
 from hexafix.errors import Fault, ImageRefused, MissingLibrary
@@ -51,7 +53,7 @@ def require_decoder(transfer_syntax: str) -> list[Fault]:
     return []
 
 
-def decode_frame(path: Path, frame: int) -> NDArray:
+def decode_frame(path: Path, frame: int, transfer_syntax: str) -> NDArray:
     """Stored pixel values of one frame, shape (J, I), before rescale; always a fresh array.
 
     Raises
@@ -62,7 +64,9 @@ def decode_frame(path: Path, frame: int) -> NDArray:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return np.array(pixel_array(path, index=frame, raw=True))
+            # pydicom finds the pixels by file position, which a deflated file does not have.
+            source = dcmread(path) if transfer_syntax == DEFLATED else path
+            return np.array(pixel_array(source, index=frame, raw=True))
     except Exception as error:  # any codec failure means the same to the user
         raise ImageRefused.of(
             "corrupt-pixel-data",

@@ -162,14 +162,14 @@ def _parse(path: Path, file: BinaryIO) -> list[SliceHeader]:
     syntax = str(dataset.file_meta.get("TransferSyntaxUID", "") or "")
     if not syntax:
         raise NotAnImage("DICOM without a transfer syntax")
-    if dataset.file_meta.get("MediaStorageSOPClassUID") == MEDIA_DIRECTORY:
-        raise NotAnImage("DICOM media directory")
     if syntax == DEFLATED:
         offset, length = None, None
     else:
         offset, length = _locate_pixels(file, dataset)
     rows, columns = _integer(dataset, "Rows"), _integer(dataset, "Columns")
     if not rows or not columns:
+        if dataset.file_meta.get("MediaStorageSOPClassUID") == MEDIA_DIRECTORY:
+            raise NotAnImage("DICOM media directory")
         raise NotAnImage("DICOM object without an image")
     frames = int(_text(dataset, "NumberOfFrames") or 1)
     if frames < 1:
@@ -231,10 +231,8 @@ def _locate_pixels(file: BinaryIO, dataset: FileDataset) -> tuple[int | None, in
 
 def _raw(dataset: Dataset, keyword: str) -> Any:
     """The element's value; raw bytes where pydicom has not converted it, None where absent."""
-    tag = _TAG[keyword]
-    if tag not in dataset:
-        return None
-    return cast(Any, dataset.get_item(tag)).value
+    element = cast(Any, dataset.get_item(_TAG[keyword]))
+    return None if element is None else element.value
 
 
 def _text(dataset: Dataset, keyword: str) -> str | None:
@@ -274,10 +272,9 @@ def _number(dataset: Dataset, keyword: str) -> float | None:
 
 def _integer(dataset: Dataset, keyword: str) -> int | None:
     """A US or SS attribute as its unsigned bit pattern."""
-    tag = _TAG[keyword]
-    if tag not in dataset:
+    element = cast(Any, dataset.get_item(_TAG[keyword]))
+    if element is None:
         return None
-    element = cast(Any, dataset.get_item(tag))
     if isinstance(element.value, bytes):
         if not element.value:
             return None

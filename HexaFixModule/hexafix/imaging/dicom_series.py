@@ -13,6 +13,7 @@ import numpy as np
 
 from hexafix.errors import Fault, ImageRefused, InputError
 from hexafix.imaging.dicom_header import NotAnImage, SliceHeader, read_headers
+from hexafix.imaging.hounsfield import faults_of_values
 from hexafix.imaging.slice_stack import arrange
 from hexafix.progress import Progress, silent
 
@@ -233,7 +234,7 @@ def _nothing_usable(folder: DicomFolder) -> list[Fault]:
     ]
     for summary in summarise(folder.slices):
         faults += [fault for fault in summary.faults if fault.code == "no-geometry"]
-    return faults
+    return faults + [f for f in faults_of_values(folder.slices) if f.code == "modality-lut"]
 
 
 def _ambiguous(folder: DicomFolder) -> Fault:

@@ -21,6 +21,7 @@ from hexafix.imaging.file_geometry import (
 _UNITS_MM = {1: 1000.0, 2: 1.0, 3: 1e-3}
 _LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _WHERE = "NIfTI header"
+_BLOCK = 1 << 20
 
 
 def read_nifti_header(path: Path) -> FileGeometry:
@@ -66,6 +67,7 @@ def read_nifti_header(path: Path) -> FileGeometry:
     affines = {name: _LPS_FROM_RAS @ _scaled(form, unit) for name, form in forms.items()}
     shape = (size[0], size[1], size[2])
     _refuse_disagreement(affines, shape)
+    _refuse_truncation(path, head, order, shape)
     return FileGeometry(shape, affines.get("sform", affines.get("qform", np.eye(4))), unit)
 
 
@@ -89,6 +91,45 @@ def _refuse_disagreement(
                 where=_WHERE,
             )
         )
+
+
+def _refuse_truncation(path: Path, head: bytes, order: str, size_ijk: tuple[int, int, int]) -> None:
+    """ITK fills what is missing at the end of a NIfTI file and says nothing."""
+    (bits,) = struct.unpack_from(order + "h", head, 72)
+    (start,) = struct.unpack_from(order + "f", head, 108)
+    expected = int(max(start, 0.0)) + size_ijk[0] * size_ijk[1] * size_ijk[2] * (bits // 8)
+    present = _length(path, expected)
+    if present < expected:
+        raise ImageRefused(
+            Fault(
+                "truncated-pixel-data",
+                "the file ends before its last voxel",
+                value=f"{present} bytes",
+                limit=f"{expected} bytes",
+                next_step="copy or convert the image again",
+                hazard="H09",
+                where=_WHERE,
+            )
+        )
+
+
+def _length(path: Path, expected: int) -> int:
+    """Length of the file; of a compressed one unpacked, with its checksum verified.
+
+    ITK takes a damaged archive for what it can unpack. Counting stops soon after `expected`, so
+    that an archive cannot inflate without end.
+    """
+    with path.open("rb") as plain:
+        if plain.read(2) != b"\x1f\x8b":
+            return path.stat().st_size
+    counted = 0
+    try:
+        with gzip.open(path) as file:
+            while counted < expected + _BLOCK and (block := file.read(_BLOCK)):
+                counted += len(block)
+    except (EOFError, zlib.error, gzip.BadGzipFile):
+        raise _broken("compressed data are damaged") from None
+    return counted
 
 
 def _scaled(form: NDArray[np.float64], unit: float) -> NDArray[np.float64]:

@@ -148,7 +148,7 @@ def read_slice(item: SliceHeader, out: NDArray) -> None:
     """
     pixels = item.pixels
     if pixels.transfer_syntax not in PLAIN_SYNTAXES:
-        stored = decode_frame(item.path, item.frame)
+        stored = decode_frame(item.path, item.frame, pixels.transfer_syntax)
         if stored.shape != out.shape:
             raise _unreadable("decoded size differs from the header")
         convert(stored, item, out)

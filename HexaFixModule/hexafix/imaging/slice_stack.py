@@ -188,7 +188,7 @@ def _mixed(slices: Sequence[SliceHeader]) -> list[Fault]:
 
 
 def _differs(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> float:
-    return float(np.max(np.abs(np.subtract(a or (), b or ()))))
+    return max(abs(x - y) for x, y in zip(a or (), b or (), strict=True))
 
 
 def _axes(slices: Sequence[SliceHeader]) -> tuple[NDArray[np.float64], list[Fault]]:

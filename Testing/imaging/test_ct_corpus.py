@@ -1,0 +1,172 @@
+"""Real files: what must be read is read like SimpleITK where that is right, the rest is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import SimpleITK as sitk  # noqa: N813
+from hexafix.errors import HexaFixError, ImageRefused
+from hexafix.imaging import read_volume
+from hexafix.imaging.dicom_header import read_headers
+from hexafix.imaging.pixel_data import read_slice
+from hexafix.imaging.slice_stack import arrange
+
+REFUSED = {
+    "dcm_qa_ct/GE_tilt_varspacing": {"uneven-spacing", "gantry-tilt"},
+    "dcm_qa_ct/Philips_tilt_m18.5": {"gantry-tilt"},
+    "dcm_qa_ct/Philips_tilt_p16.5": {"gantry-tilt"},
+    "dcm_qa_ct/Philips_mixed_extra": {"no-usable-series", "no-geometry"},
+    "dicom2nifti_failing/gantrytilting/001": {"gantry-tilt"},
+    "dicom2nifti_failing/sliceincrement/001": {"missing-slice"},
+    "dicom2nifti_failing/sliceincrement/002": {"missing-slice", "gantry-tilt"},
+    "dicom2nifti_failing/sliceorientation/001": {
+        "mixed-orientation",
+        "mixed-spacing",
+        "duplicate-slice",
+    },
+    "dicom2nifti_failing/notavolume/001": {"too-few-slices", "duplicate-slice"},
+    "dicom2nifti_failing/slicecount/001": {"too-few-slices"},
+    "pydicom/dicomdirtests_77654033_CT2": {"missing-slice"},
+    "pydicom/MR_truncated.dcm": {"too-few-slices", "truncated-pixel-data"},
+    "pydicom/rtplan.dcm": {"no-dicom-image"},
+    "pydicom/badVR.dcm": {"no-dicom-image"},
+    "pydicom/no_meta.dcm": {"no-dicom-image"},
+    "pydicom-data/emri_small_big_endian.dcm": {"no-geometry"},
+    "pydicom-data/mlut_18.dcm": {"no-usable-series", "no-geometry", "modality-lut"},
+    "fo-dicom/CT-MONO2-16-ankle": {"no-usable-series", "no-geometry"},
+    "fo-dicom/GH1376.dcm": {"too-few-slices", "truncated-pixel-data"},
+    "fo-dicom/GH342.dcm": {"no-usable-series"},
+    "fo-dicom/GH177_D_CLUNIE_CT1_IVRLE_BigEndian_undefined_length.dcm": {"no-dicom-image"},
+    "crasher/sitk257_segfault_one_byte.dcm": {"no-geometry"},
+    "cornerstone_transfer_syntaxes/no-pixel-data.dcm": {"no-dicom-image"},
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_real_trap_is_refused_for_its_reason(name, ct_corpus):
+    with pytest.raises(HexaFixError) as caught:
+        read_volume(ct_corpus / name)
+    assert {fault.code for fault in caught.value.faults} == REFUSED[name]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dcm_qa_ct/Philips_plain5mm",
+        "dcmqi_ct3",
+        "pydicom/dicomdirtests_98892001_CT5N",
+        "dicom2nifti_failing/non_isotropic_oblique",
+    ],
+)
+def test_a_real_series_is_read_as_simpleitk_reads_it(name, ct_corpus):
+    volume = read_volume(ct_corpus / name)
+    reader = sitk.ImageSeriesReader()
+    reader.SetFileNames(reader.GetGDCMSeriesFileNames(str(ct_corpus / name)))
+    image = reader.Execute()
+    # A padding value below air is air here and stays in SimpleITK.
+    expected = np.maximum(sitk.GetArrayFromImage(image), -1024)
+    np.testing.assert_allclose(np.maximum(volume.voxels, -1024), expected, rtol=1e-6)
+    for corner in np.ndindex(2, 2, 2):
+        index = [int(c * (n - 1)) for c, n in zip(corner, volume.size_ijk, strict=True)]
+        np.testing.assert_allclose(
+            volume.lps_from_ijk(index), image.TransformIndexToPhysicalPoint(index), atol=1e-3
+        )
+
+
+def test_a_left_handed_enhanced_ct_keeps_its_places(ct_corpus):
+    path = ct_corpus / "pydicom-data/eCT_Supplemental.dcm"
+    volume, image = read_volume(path), sitk.ReadImage(str(path))
+    values = sitk.GetArrayFromImage(image)
+    for index in [(0, 0, 0), (511, 0, 0), (0, 511, 0), (100, 200, 1), (511, 511, 1)]:
+        here = np.rint(volume.ijk_from_lps(image.TransformIndexToPhysicalPoint(index))).astype(int)
+        assert volume.voxels[tuple(here[::-1])] == values[tuple(index[::-1])]
+
+
+@pytest.mark.parametrize("tail", ["1.2.2", "1.2.1.99", "4.90", "4.80", "4.57", "4.70", "1.2.5"])
+def test_lossless_transfer_syntaxes_give_one_image(tail, ct_corpus):
+    folder = ct_corpus / "cornerstone_transfer_syntaxes"
+
+    def hounsfield(path):
+        (header,) = read_headers(path)
+        out = np.empty((512, 512), np.float32)
+        read_slice(header, out)
+        return out
+
+    (path,) = folder.glob(f"*{tail}.dcm")
+    np.testing.assert_array_equal(hounsfield(path), hounsfield(folder / "CTImage.dcm"))
+
+
+@pytest.mark.parametrize("name", ["3mm", "4mm", "5mm", "10mm", "20mm"])
+def test_sagittal_nrrd_spheres_are_read_as_simpleitk_reads_them(name, ct_corpus):
+    path = ct_corpus / f"spheres_nrrd/{name}FiducialTest.nrrd"
+    volume, image = read_volume(path), sitk.ReadImage(str(path))
+    np.testing.assert_array_equal(volume.voxels, sitk.GetArrayFromImage(image))
+    np.testing.assert_allclose(
+        volume.lps_from_ijk([10, 20, 30]), image.TransformIndexToPhysicalPoint([10, 20, 30])
+    )
+
+
+def test_an_oblique_nifti_is_read(ct_corpus):
+    path = ct_corpus / "niivue/CT_pitch.nii.gz"
+    volume, image = read_volume(path), sitk.ReadImage(str(path))
+    index = (174, 247, 57)
+    np.testing.assert_allclose(
+        volume.lps_from_ijk(index), image.TransformIndexToPhysicalPoint(index), atol=1e-3
+    )
+    normal = volume.direction[:, 2]
+    assert np.degrees(np.arccos(abs(normal[2]))) == pytest.approx(16.5, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "tilt"),
+    [
+        ("dcm_qa_ct/Philips_tilt_m18.5", 18.5),
+        ("dcm_qa_ct/Philips_tilt_p16.5", 16.5),
+        ("dicom2nifti_failing/gantrytilting/001", 14.0),
+    ],
+)
+def test_the_tilt_is_found_from_positions_whatever_the_tag_says(name, tilt, ct_corpus):
+    slices = [h for file in sorted((ct_corpus / name).iterdir()) for h in read_headers(file)]
+    stack, _ = arrange(slices)
+    assert stack is not None
+    assert stack.tilt_deg == pytest.approx(tilt, abs=0.01)
+
+
+def test_no_corpus_file_ends_in_anything_but_a_volume_or_a_refusal(ct_corpus):
+    outcomes, leaks = set(), 0
+    for path in sorted(p for p in ct_corpus.rglob("*") if p.is_file()):
+        if path.parent.name == "GE_tilt_varspacing":
+            continue
+        try:
+            read_volume(path)
+            outcomes.add("read")
+        except HexaFixError as error:
+            outcomes.add(type(error).__name__)
+            leaks += str(ct_corpus) in str(error)
+    assert leaks == 0
+    assert outcomes == {"read", "ImageRefused", "InputError"}
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_mirrored_copy_of_a_real_series_is_never_read_as_the_same_image(
+    axis, ct_corpus, tmp_path
+):
+    image = sitk.ReadImage(str(ct_corpus / "spheres_nrrd/10mmFiducialTest.nrrd"))
+    flipped = [axis == 0, axis == 1, axis == 2]
+    mirror = sitk.GetImageFromArray(np.flip(sitk.GetArrayFromImage(image), 2 - axis))
+    mirror.CopyInformation(image)
+    same = sitk.Flip(image, flipped)
+    hashes = []
+    for name, item in (("mirror", mirror), ("same", same)):
+        sitk.WriteImage(item, str(tmp_path / f"{name}.nrrd"))
+        volume = read_volume(tmp_path / f"{name}.nrrd")
+        hashes.append(volume.source.sha256)
+        expected = -1.0 if name == "same" else 1.0
+        assert np.linalg.det(volume.direction) == pytest.approx(expected)
+    assert hashes[0] != hashes[1]
+
+
+def test_dropped_geometry_is_never_replaced(ct_corpus):
+    with pytest.raises(ImageRefused) as caught:
+        read_volume(ct_corpus / "fo-dicom/GH355.dcm")
+    assert [fault.hazard for fault in caught.value.faults] == ["H07"]
