@@ -27,6 +27,7 @@ from hexafix.correction import (
 from hexafix.correction.targets import planned_motion
 from hexafix.errors import HexaFixError, LayoutRejected
 from hexafix.geometry import Pose
+from hexafix.imaging import Volume
 from hexafix.kinematics import BasinCheck, ForwardSolution, forward_kinematics, second_starts
 from hexafix.pipeline import plan_document
 from hexafix.pipeline.recognise import Recognised, read_case_image, recognise
@@ -79,6 +80,7 @@ class Plan:
 def plan_correction(
     case: Case,
     *,
+    volume: Volume | None = None,
     accept_relaxed_layout: bool = False,
     progress: Progress = silent,
 ) -> Plan:
@@ -88,6 +90,8 @@ def plan_correction(
     ----------
     case : Case
         With readings, correction and schedule.
+    volume : Volume, optional
+        The CT, where a program holds it already; else it is read from the case's path.
     accept_relaxed_layout : bool
         Whether the user accepts a layout that keeps only the relaxed angle rule (H17).
     progress : Progress, optional
@@ -101,7 +105,8 @@ def plan_correction(
     faults = layout_faults(layout, accept_relaxed=accept_relaxed_layout, numbering_settled=True)
     if faults:
         raise LayoutRejected(*faults)
-    volume = read_case_image(case, progress=progress)
+    if volume is None:
+        volume = read_case_image(case, progress=progress)
     recognised = recognise(case, volume, progress=progress)
     gates.decide(recognised.gates)
     progress("plan the correction", 0.0)
@@ -114,6 +119,7 @@ def plan_and_export(
     case: Case,
     folder: Path,
     *,
+    volume: Volume | None = None,
     accept_relaxed_layout: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -124,7 +130,7 @@ def plan_and_export(
     case : Case
     folder : Path
         Where the export goes, all or nothing.
-    accept_relaxed_layout, progress
+    volume, accept_relaxed_layout, progress
         As in `plan_correction`.
 
     Returns
@@ -139,7 +145,12 @@ def plan_and_export(
     """
     export.check_target(folder)
     with SceneRenderer() as renderer:
-        plan = plan_correction(case, accept_relaxed_layout=accept_relaxed_layout, progress=progress)
+        plan = plan_correction(
+            case,
+            volume=volume,
+            accept_relaxed_layout=accept_relaxed_layout,
+            progress=progress,
+        )
         document = plan_document.plan(plan)
         renderer.show(_scene(document, plan))
         progress("recompute by another road", 0.0)

@@ -146,8 +146,7 @@ def _schedule_checks(
     rows = schedule["rows"]
     values = np.array([row["strut_mm"] for row in rows], float)
     step = schedule["strut_step_mm"]
-    count = max(len(rows) - 1, 1)
-    poses = [rigid.between(start, goal, k / count) for k in range(len(rows))]
+    poses = rigid.along(start, goal, np.arange(len(rows)) / max(len(rows) - 1, 1))
     exact = np.array([rigid.strut_lengths(pose, fixator) for pose in poses]) - offset
     low, high = fixator["strut"]["min_mm"] - offset, fixator["strut"]["max_mm"] - offset
     outside = np.maximum(low - values, values - high).max()
@@ -168,7 +167,7 @@ def _schedule_checks(
 def _rate_checks(
     document: dict[str, Any],
     fixator: dict[str, Any],
-    poses: list[NDArray[np.float64]],
+    poses: NDArray[np.float64],
     planned: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> list[Check]:
     """Speeds of the watched points along the path, summed over fine chords."""
@@ -184,9 +183,9 @@ def _rate_checks(
     else:
         joints = np.vstack([np.zeros(3), fixator[moving]["joints_mm"]])
         points = np.hstack([joints, np.ones((7, 1))])
-    fine = [rigid.between(poses[0], poses[-1], s) for s in np.linspace(0.0, 1.0, 65)]
-    seen = [pose if moving == "proximal" else np.linalg.inv(pose) for pose in fine]
-    track = np.array([points @ pose.T for pose in seen])[:, :, :3]
+    fine = rigid.along(poses[0], poses[-1], np.linspace(0.0, 1.0, 65))
+    seen = fine if moving == "proximal" else np.linalg.inv(fine)
+    track = (points @ np.swapaxes(seen, 1, 2))[:, :, :3]
     way = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0).max() / days
     turn = rigid.angle_deg(poses[0], poses[-1]) / days
     most_mm, most_deg = rules["max_rate_mm_per_day"], rules["max_rate_deg_per_day"]

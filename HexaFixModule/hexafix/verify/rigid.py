@@ -103,10 +103,13 @@ def forward(lengths: Matrix, fixator: dict[str, Any], start: Matrix) -> Matrix:
     return pose_of(fit.x)
 
 
-def between(start: Matrix, end: Matrix, s: float) -> Matrix:
-    """The pose at s in [0, 1] on the screw from start to end, by matrix logarithm."""
+def along(start: Matrix, end: Matrix, s: NDArray[np.float64]) -> Matrix:
+    """Poses at s, shape (S,), in [0, 1] on the screw from start to end, shape (S, 4, 4).
+
+    By matrix logarithm and exponential.
+    """
     step = np.real(logm(np.linalg.solve(start, end)))
-    return start @ expm(s * step)
+    return start @ expm(np.asarray(s)[:, None, None] * step)
 
 
 def fuse(
