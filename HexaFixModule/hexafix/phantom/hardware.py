@@ -49,13 +49,13 @@ def plate(pose: Pose, ring: Ring, hu: float) -> Solid:
     middle, half = outer - PLATE_WIDTH_MM / 2.0, PLATE_WIDTH_MM / 2.0
     pitch = np.float32(2.0 * np.pi / HOLES)
 
-    def distance(x: Array, y: Array, z: Array) -> Array:
+    def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
         rho = np.hypot(x, y)
-        band = np.maximum(np.abs(rho - middle) - half, np.abs(z + thickness / 2) - thickness / 2)
         angle = np.arctan2(y, x)
         angle = angle - pitch * np.rint(angle / pitch)
         hole = HOLE_RADIUS_MM - np.hypot(rho * np.cos(angle) - middle, rho * np.sin(angle))
-        return np.maximum(band, hole)
+        face = np.abs(z + thickness / 2) - thickness / 2
+        return np.maximum(np.abs(rho - middle) - half, hole), face
 
     return Solid(distance, pose, (-outer, -outer, -thickness), (outer, outer, 0.0), ((0.0, hu),))
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hexafix.geometry import Pose
 from hexafix.phantom.scene import Scene
-from hexafix.phantom.solids import Array, Distance, Solid, cylinder, slab_box
+from hexafix.phantom.solids import Array, Solid, cylinder, slab_box
 from hexafix.phantom.spec import PhantomSpec
 
 SKIN_HU, FAT_HU, MUSCLE_HU, CORTEX_HU, MARROW_HU = 60.0, -100.0, 55.0, 1450.0, 40.0
@@ -47,7 +49,7 @@ def _soft_tissue(spec: PhantomSpec, scene: Scene) -> Solid:
     return Solid(distance, scene.bone_b, low, high, layers)
 
 
-def _skin_distance(spec: PhantomSpec, scene: Scene) -> Distance:
+def _skin_distance(spec: PhantomSpec, scene: Scene) -> Callable[[Array, Array, Array], Array]:
     """Signed distance from the skin in the distal fragment's bone frame."""
     shift = scene.bone_b.inverse() @ scene.bone_a
     slope = (shift.rotation[:, 2] / shift.rotation[2, 2]).astype(np.float32)

@@ -10,6 +10,7 @@ import numpy as np
 from hexafix.errors import Fault, InputError
 from hexafix.imaging import ImageSource, Volume
 from hexafix.imaging.fingerprint import fingerprint
+from hexafix.kinematics import strut_lengths
 from hexafix.phantom.balls import ExactBall
 from hexafix.phantom.decoys import decoys_of
 from hexafix.phantom.hardware import STRUT_RADIUS_MM, frame_solids
@@ -18,7 +19,7 @@ from hexafix.phantom.render import render
 from hexafix.phantom.scene import Scene, build_scene, distance_to_struts_mm
 from hexafix.phantom.spec import PhantomSpec
 from hexafix.phantom.streaks import streaks_of
-from hexafix.phantom.truth import case_document, truth_document
+from hexafix.phantom.truth import case_document, in_image, truth_document
 from hexafix.progress import Progress, silent
 
 
@@ -66,7 +67,7 @@ def make_phantom(
     scene = build_scene(spec)
     loose, other_balls, listed = decoys_of(spec, scene)
     truth = truth_document(spec, scene, listed)
-    _check(spec, scene, truth)
+    check_buildable(spec, scene)
     solids = limb_solids(spec, scene) + frame_solids(spec, scene) + loose
     balls = other_balls + [
         ExactBall(center, spec.ball_diameter_mm / 2.0, spec.ball_hu)
@@ -97,44 +98,37 @@ BODY_PART = {"tibia": "LEG", "femur": "LEG", "humerus": "ARM", "forearm": "ARM",
 """BodyPartExamined by bone."""
 
 
-def _check(spec: PhantomSpec, scene: Scene, truth: dict[str, Any]) -> None:
-    """Refuse a frame that could not be built or that the scan would miss."""
+def check_buildable(spec: PhantomSpec, scene: Scene) -> None:
+    """Refuse a frame that could not be built or that the scan would miss.
+
+    Raises
+    ------
+    InputError
+        Naming every strut out of its stroke, now or at the target, and every ball that sits in a
+        strut or lies outside the volume.
+    """
     faults = []
     stroke = spec.fixator.strut
-    for number, length in enumerate(scene.strut_lengths_mm, start=1):
-        if not stroke.min_mm <= length <= stroke.max_mm:
-            faults.append(
-                Fault(
-                    "phantom-strut",
-                    f"strut {number} of this mechanism pose leaves its stroke",
-                    f"{length:.2f} mm",
-                    f"{stroke.min_mm} to {stroke.max_mm} mm",
-                    "choose another mechanism pose",
-                )
-            )
-    for ball in truth["balls"]:
-        if not spec.partial_frame and not ball["whole_in_image"]:
-            faults.append(
-                Fault(
-                    "phantom-ball-outside",
-                    f"ball {ball['number']} does not lie wholly in the volume",
-                    str([round(c, 1) for c in ball["center_mm"]]) + " mm LPS",
-                    "inside, with its blur",
-                    "choose more or larger voxels, or ask for a partial frame",
-                )
-            )
-    room = distance_to_struts_mm(scene, np.array(list(scene.balls_mm.values())))
+    target = strut_lengths(spec.target_pose, spec.fixator)
+    for when, lengths in (("now", scene.strut_lengths_mm), ("at the target", target)):
+        for number, length in enumerate(lengths, start=1):
+            if not stroke.min_mm <= length <= stroke.max_mm:
+                what = f"strut {number} would be out of its stroke {when}"
+                limit = f"{stroke.min_mm} to {stroke.max_mm} mm"
+                step = "choose another pose"
+                faults.append(Fault("phantom-strut", what, f"{length:.2f} mm", limit, step))
+    centers = np.array(list(scene.balls_mm.values()))
     least = spec.ball_diameter_mm / 2.0 + STRUT_RADIUS_MM
-    for number, gap in zip(scene.balls_mm, room, strict=True):
+    room = distance_to_struts_mm(scene, centers)
+    for number, center, gap in zip(scene.balls_mm, centers, room, strict=True):
         if gap < least:
-            faults.append(
-                Fault(
-                    "phantom-collision",
-                    f"ball {number} would sit in a strut",
-                    f"{gap:.1f} mm from its axis",
-                    f"≥ {least:.1f} mm",
-                    "give this marker another sweep angle",
-                )
-            )
+            what, value = f"ball {number} would sit in a strut", f"{gap:.1f} mm from its axis"
+            step = "give this marker another sweep angle"
+            faults.append(Fault("phantom-collision", what, value, f"at least {least:.1f} mm", step))
+        if not spec.partial_frame and not in_image(center, spec.ball_diameter_mm / 2.0, scene):
+            what = f"ball {number} does not lie wholly in the volume"
+            value = f"{np.round(center, 1).tolist()} mm LPS"
+            step = "choose more or larger voxels, or ask for a partial frame"
+            faults.append(Fault("phantom-ball-outside", what, value, "inside with its blur", step))
     if faults:
         raise InputError(*faults)

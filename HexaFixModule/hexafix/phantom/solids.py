@@ -13,7 +13,7 @@ from hexafix.geometry import Pose
 
 Array = NDArray[np.floating]
 Size = tuple[float, float, float]
-Distance = Callable[[Array, Array, Array], Array]
+Distance = Callable[[Array, Array, Array], Array | tuple[Array, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,8 @@ class Solid:
     ----------
     distance : callable
         Signed distance in mm (negative inside) of arrays x, y, z, mm in the solid's own frame.
+        Several distances are those of faces that meet at right angles: the solid is what lies
+        inside all of them, and its blurred image the product of theirs.
     pose : Pose
         The solid's frame in LPS.
     low_mm, high_mm : tuple of float
@@ -78,13 +80,13 @@ def paint(slab: Array, first_slice: int, solid: Solid, grid: Grid) -> None:
     Notes
     -----
     The edge is the Gaussian-blurred edge of a half space whose width holds the PSF and the
-    voxel; slices thicker than 1 mm are averaged from thinner ones.
+    voxel; slices thicker than the pixels are averaged from thinner ones.
     """
     spacing = grid.spacing_mm
-    parts = max(1, int(np.ceil(grid.thickness_mm / 1.0 - 1e-9)))
+    parts = max(1, round(grid.thickness_mm / max(float(spacing[:2].mean()), 0.5)))
     box = np.array([spacing[0], spacing[1], grid.thickness_mm / parts])
     sigma = float(np.sqrt(grid.psf_sigma_mm**2 + np.mean(box**2) / 12.0))
-    reach = 4.0 * sigma + grid.thickness_mm
+    reach = 5.0 * sigma + grid.thickness_mm
     ranges = box_in_slab(
         solid.pose, solid.low_mm, solid.high_mm, reach, grid, slab.shape[0], first_slice
     )
@@ -96,9 +98,12 @@ def paint(slab: Array, first_slice: int, solid: Solid, grid: Grid) -> None:
     offsets = ((np.arange(parts) + 0.5) / parts - 0.5) * grid.thickness_mm / spacing[2]
     scale = np.float32(1.0 / (np.sqrt(2.0) * sigma))
     for offset in offsets:
-        depth = solid.distance(*local_coordinates(solid.pose, i, j, k, float(offset), grid))
+        depths = solid.distance(*local_coordinates(solid.pose, i, j, k, float(offset), grid))
+        depths = depths if isinstance(depths, tuple) else (depths,)
         for number, (inset, hu) in enumerate(solid.layers):
-            share = np.float32(0.5) * erfc((depth + np.float32(inset)) * scale)
+            share = np.float32(0.5) * erfc((depths[0] + np.float32(inset)) * scale)
+            for depth in depths[1:]:
+                share *= np.float32(0.5) * erfc((depth + np.float32(inset)) * scale)
             if parts > 1:
                 shares[number] += share / np.float32(parts)
             else:
@@ -214,8 +219,8 @@ def cylinder(
     """Cylinder along a frame's z axis from bottom to top."""
     middle, half = 0.5 * (bottom_mm + top_mm), 0.5 * (top_mm - bottom_mm)
 
-    def distance(x: Array, y: Array, z: Array) -> Array:
-        return np.maximum(np.hypot(x, y) - np.float32(radius_mm), np.abs(z - middle) - half)
+    def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
+        return np.hypot(x, y) - np.float32(radius_mm), np.abs(z - middle) - half
 
     return Solid(
         distance, pose, (-radius_mm, -radius_mm, bottom_mm), (radius_mm, radius_mm, top_mm), layers
@@ -227,10 +232,10 @@ def hex_prism(pose: Pose, bottom_mm: float, top_mm: float, flats_mm: float, hu: 
     middle, half = 0.5 * (bottom_mm + top_mm), 0.5 * (top_mm - bottom_mm)
     cos, sin = np.float32(0.5), np.float32(np.sqrt(0.75))
 
-    def distance(x: Array, y: Array, z: Array) -> Array:
+    def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
         side = np.maximum(np.abs(x), np.abs(cos * x + sin * y))
         side = np.maximum(side, np.abs(cos * x - sin * y)) - np.float32(flats_mm / 2.0)
-        return np.maximum(side, np.abs(z - middle) - half)
+        return side, np.abs(z - middle) - half
 
     r = flats_mm / np.sqrt(3.0)
     return Solid(distance, pose, (-r, -r, bottom_mm), (r, r, top_mm), ((0.0, hu),))
@@ -252,8 +257,8 @@ def ellipsoid(pose: Pose, radii_mm: Size, hu: float) -> Solid:
 def half_ball(pose: Pose, radius_mm: float, hu: float) -> Solid:
     """Dome on a frame's x-y plane, towards +z."""
 
-    def distance(x: Array, y: Array, z: Array) -> Array:
-        return np.maximum(np.sqrt(x * x + y * y + z * z) - np.float32(radius_mm), -z)
+    def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
+        return np.sqrt(x * x + y * y + z * z) - np.float32(radius_mm), -z
 
     low, high = (-radius_mm, -radius_mm, 0.0), (radius_mm, radius_mm, radius_mm)
     return Solid(distance, pose, low, high, ((0.0, hu),))
@@ -263,7 +268,7 @@ def slab_box(pose: Pose, half_mm: Size, layers: tuple[tuple[float, float], ...])
     """Rectangular board about a frame's origin with half sizes along its axes."""
     a, b, c = (np.float32(h) for h in half_mm)
 
-    def distance(x: Array, y: Array, z: Array) -> Array:
-        return np.maximum(np.maximum(np.abs(x) - a, np.abs(y) - b), np.abs(z) - c)
+    def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
+        return np.abs(x) - a, np.abs(y) - b, np.abs(z) - c
 
     return Solid(distance, pose, (-half_mm[0], -half_mm[1], -half_mm[2]), half_mm, layers)

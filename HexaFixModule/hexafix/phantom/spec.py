@@ -33,7 +33,7 @@ def _proximal() -> MarkerLayout:
 def _distal() -> MarkerLayout:
     return MarkerLayout.of(
         radius_mm=(100.0,) * 4,
-        sweep_deg=(20.0, 112.0, 212.0, 266.0),
+        sweep_deg=(20.0, 120.0, 240.0, 180.0),
         height_mm=(20, 20, 20, 45),
         first_number=5,
     )
