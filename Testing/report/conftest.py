@@ -214,7 +214,7 @@ def example_document(
         "case_id": case_id,
         "limb": {"side": side, "bone": bone},
         "case": case,
-        "inputs": {f"{k}_sha256": c * 64 for k, c in zip(("case", "image", "fixator"), "a3f")},
+        "inputs": {"case_sha256": "a" * 64, "image_sha256": "3" * 64, "fixator_sha256": "f" * 64},
         "versions": {"python": "3.11.7", "numpy": "2.4.6"},
         "image": {
             "frame": "LPS",
@@ -272,3 +272,9 @@ def a_plan(_short_plan):
 def a_long_plan():
     """Sixty days of four adjustments, right femur."""
     return example_document(days=60, case_id="right-femur-07", side="right", bone="femur")
+
+
+@pytest.fixture
+def make_plan():
+    """The example plan with other days, adjustments a day or strut step."""
+    return example_document

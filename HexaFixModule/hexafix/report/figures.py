@@ -9,7 +9,7 @@ import numpy as np
 
 from hexafix.report.format import format_number
 from hexafix.report.scene import SceneGeometry, View, view_from_above
-from hexafix.report.svg import Canvas
+from hexafix.report.svg import Canvas, shifted
 from hexafix.report.words import RING_COLOURS, STRUT_COLOURS
 
 INK, FAINT, PAPER = "#1c2733", "#9aa5b1", "#ffffff"
@@ -36,10 +36,10 @@ def layout_rose(document: Mapping[str, Any], ring: str) -> str:
     largest = max(site["radius_mm"] for site in sites)
     colour = RING_COLOURS[ring]
     canvas.circle(middle, reach, fill="none", stroke=colour, stroke_width=1.4, opacity=0.45)
-    canvas.line(middle, middle + [reach + 5, 0], stroke=INK, stroke_width=0.35)
-    canvas.text(middle + [reach + 5.6, 1.0], "x front", size_mm=2.7, fill=INK)
-    canvas.line(middle, middle - [0, reach + 5], stroke=FAINT, stroke_width=0.3)
-    canvas.text(middle - [-1.5, reach + 4], "y", size_mm=2.7, fill=INK)
+    canvas.line(middle, shifted(middle, reach + 5, 0), stroke=INK, stroke_width=0.35)
+    canvas.text(shifted(middle, reach + 5.6, 1), "x front", size_mm=2.7, fill=INK)
+    canvas.line(middle, shifted(middle, 0, -reach - 5), stroke=FAINT, stroke_width=0.3)
+    canvas.text(shifted(middle, 1.5, -reach - 4), "y", size_mm=2.7, fill=INK)
     sweeps = sorted(float(site["sweep_deg"]) % 360 for site in sites)
     for this, following in zip(sweeps, [*sweeps[1:], sweeps[0] + 360], strict=True):
         half = np.radians((this + following) / 2)
@@ -51,7 +51,7 @@ def layout_rose(document: Mapping[str, Any], ring: str) -> str:
         at = middle + reach * site["radius_mm"] / largest * np.array([np.cos(phi), -np.sin(phi)])
         canvas.line(middle, at, stroke=colour, stroke_width=0.5)
         canvas.circle(at, 3.0, fill=PAPER, stroke=INK, stroke_width=0.5)
-        place = at + [0, 1.25]
+        place = shifted(at, 0, 1.25)
         style: dict[str, object] = {"text_anchor": "middle", "font_weight": "bold", "fill": INK}
         canvas.text(place, str(site["number"]), size_mm=3.6, **style)
     return canvas.svg()
@@ -121,7 +121,7 @@ def _axes(canvas: Canvas, box: Any, y_range: Any, last_day: float) -> None:
 
 
 def strut_map(scene: SceneGeometry) -> str:
-    """Where each strut sits, seen from above: upper ring, struts, numbers and the patient's sides."""
+    """Where each strut sits, seen from above, with the patient's sides (SVG)."""
     view = view_from_above(scene)
     canvas = Canvas(view.width_mm, view.height_mm)
     _map_ring(canvas, view, scene)

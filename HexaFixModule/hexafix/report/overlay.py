@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexafix.report.figures import FAINT, INK, PAPER, badge
 from hexafix.report.scene import ANATOMY, SceneGeometry, View, transform
-from hexafix.report.svg import Canvas
+from hexafix.report.svg import Canvas, shifted
 from hexafix.report.words import RING_COLOURS, STRUT_COLOURS
 
 STRUT_BADGE_MM, BALL_LABEL_MM = 8.0, 8.0
@@ -106,7 +106,7 @@ def _ball_labels(canvas: Canvas, view: View, scene: SceneGeometry, places: _Plac
         canvas.circle(at, BALL_LABEL_MM, fill=PAPER, stroke=colour, stroke_width=1.8)
         style = {"text_anchor": "middle", "font_weight": "bold", "fill": INK}
         size = 10.5 if ball.number < 10 else 8.5
-        canvas.text(at + [0, 0.36 * size], str(ball.number), size_mm=size, **style)
+        canvas.text(shifted(at, 0, 0.36 * size), str(ball.number), size_mm=size, **style)
 
 
 def _ring_letters(canvas: Canvas, view: View, scene: SceneGeometry) -> list[NDArray[np.float64]]:
@@ -115,7 +115,7 @@ def _ring_letters(canvas: Canvas, view: View, scene: SceneGeometry) -> list[NDAr
     for ring, letter in (("proximal", "A"), ("distal", "B")):
         outline = view.project(scene.outline_mm(ring, scene.ring(ring).outer_radius_mm, 0.0))
         rim = outline[int(np.argmin(outline[:, 0])), :2]
-        at = rim + [-9.0, 4.5]
+        at = np.array(shifted(rim, -9.0, 4.5))
         style = {"text_anchor": "middle", "fill": RING_COLOURS[ring]}
         canvas.label(at, letter, size_mm=13.0, **style)
         taken.append(at - [0.0, 4.5])
@@ -177,7 +177,10 @@ def _draw_ring(canvas: Canvas, view: View, scene: SceneGeometry, ring: str) -> N
     inner = scene.inner_radius_mm(ring)
     colour = RING_COLOURS[ring]
     lower, upper = (
-        [view.project(scene.outline_mm(ring, r, z))[:, :2] for r in (hardware.outer_radius_mm, inner)]
+        [
+            view.project(scene.outline_mm(ring, r, z))[:, :2]
+            for r in (hardware.outer_radius_mm, inner)
+        ]
         for z in (-hardware.thickness_mm, 0.0)
     )
     if scene.ring_pose(ring)[:3, 2] @ view.toward < 0:

@@ -31,6 +31,8 @@ OPENGL_WINDOWS: tuple[str | None, ...] = (
 )
 """Offscreen windows of VTK, tried in this order; None leaves the choice to VTK."""
 
+CHILD_SCRIPT = Path(__file__).with_name("vtk_child.py")
+
 REASONS = {
     EXIT_NO_VTK: "VTK is not installed",
     EXIT_NO_WINDOW: "VTK has no offscreen OpenGL here",
@@ -129,10 +131,9 @@ class SceneRenderer:
         window = self._windows.pop(0)
         if window is not None:
             environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-        script = Path(__file__).with_name("vtk_child.py")
         try:
             return subprocess.Popen(
-                [sys.executable, "-I", str(script)],
+                [sys.executable, "-I", str(CHILD_SCRIPT)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,

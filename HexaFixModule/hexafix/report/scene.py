@@ -131,17 +131,22 @@ class SceneGeometry:
 
 def _fixator(definition: Mapping[str, Any]) -> Fixator:
     """The fixator of a definition that the case reader has already checked."""
-    rings = [
+    proximal, distal = (
         Ring(
             np.array(definition[name]["joints_mm"], float),
             float(definition[name]["thickness_mm"]),
             float(definition[name]["outer_radius_mm"]),
         )
         for name in ("proximal", "distal")
-    ]
+    )
     strut = StrutType(float(definition["strut"]["min_mm"]), float(definition["strut"]["max_mm"]))
     return Fixator(
-        definition["id"], definition["name"], definition.get("source") or "", *rings, strut
+        definition["id"],
+        definition["name"],
+        definition.get("source") or "",
+        proximal,
+        distal,
+        strut,
     )
 
 
@@ -267,7 +272,7 @@ def sample_bone(volume: Volume, scene: SceneGeometry) -> BoneSample:
     tips = np.stack([centers[0] + BONE_MARGIN_MM * axis, centers[1] - BONE_MARGIN_MM * axis])
     corners = np.vstack([tips - radius, tips + radius])
     box = volume.ijk_from_lps(
-        np.stack(np.meshgrid(*zip(corners.min(0), corners.max(0)), indexing="ij"), -1)
+        np.stack(np.meshgrid(*np.stack([corners.min(0), corners.max(0)], -1), indexing="ij"), -1)
     ).reshape(-1, 3)
     size = np.array(volume.size_ijk)
     low = np.clip(np.floor(box.min(0)).astype(int), 0, size - 1)

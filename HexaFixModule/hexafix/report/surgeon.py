@@ -172,8 +172,7 @@ def motion_table(document: Mapping[str, Any]) -> Table | None:
     if not motion:
         return None
     rows = tuple(
-        tuple(format_number(x, 6) for x in row[:3]) + (format_mm(row[3]),)
-        for row in motion["matrix"][:3]
+        (*(format_number(x, 6) for x in row[:3]), format_mm(row[3])) for row in motion["matrix"][:3]
     )
     note = f"p' = M p in LPS, mm; rotation {format_deg(motion['rotation_deg'])}°."
     head = ("rotation", "", "", "translation mm")
@@ -316,6 +315,7 @@ def version_table(document: Mapping[str, Any]) -> Table:
 def surgeon_tables(document: Mapping[str, Any]) -> dict[str, Table | None]:
     """All tables of the surgeon's pages by name, in printing order."""
     return {
+        "gates": gate_table(document),
         "rings": ring_table(document),
         "mechanism": mechanism_table(document),
         "witness": strut_witness_table(document),
@@ -323,7 +323,6 @@ def surgeon_tables(document: Mapping[str, Any]) -> dict[str, Table | None]:
         "motion": motion_table(document),
         "rates": rate_table(document),
         "struts": strut_plan_table(document),
-        "gates": gate_table(document),
         "layout": layout_table(document),
         "balls": ball_table(document),
         "rejected": rejected_table(document),

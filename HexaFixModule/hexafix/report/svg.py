@@ -6,9 +6,16 @@ import base64
 from collections.abc import Iterable, Sequence
 from xml.sax.saxutils import escape
 
-Point = Sequence[float]
+from numpy.typing import NDArray
+
+Point = Sequence[float] | NDArray
 
 FONT = "Roboto"
+
+
+def shifted(point: Point, right: float, down: float) -> tuple[float, float]:
+    """The point moved to the right and down, mm."""
+    return float(point[0]) + right, float(point[1]) + down
 
 
 def _n(value: float) -> str:

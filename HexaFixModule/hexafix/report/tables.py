@@ -34,7 +34,7 @@ def schedule_csv(document: dict[str, Any]) -> bytes:
         prescription.
     """
     schedule = document["schedule"]
-    lines = [SCHEDULE_COLUMNS]
+    lines: list[tuple[str, ...]] = [SCHEDULE_COLUMNS]
     for row in schedule["rows"]:
         values = format_row(row, schedule["strut_step_mm"])
         lines.append((str(row["day"]), row["date"], str(row["adjustment"]), *values))

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 BONE_HU, METAL_HU = 220.0, 2300.0
@@ -19,37 +21,37 @@ EXIT_NO_VTK, EXIT_NO_WINDOW, EXIT_BLANK = 3, 4, 5
 STEEL, IVORY, BALL = (0.62, 0.66, 0.70), (0.96, 0.91, 0.78), (0.90, 0.92, 0.95)
 
 
+VTK_CLASSES = {
+    "vtkCommonCore": ("vtkPoints",),
+    "vtkCommonDataModel": ("vtkCellArray", "vtkImageData", "vtkPolyData"),
+    "vtkCommonTransforms": ("vtkTransform",),
+    "vtkFiltersCore": (
+        *("vtkFlyingEdges3D", "vtkPolyDataConnectivityFilter", "vtkPolyDataNormals"),
+        *("vtkTubeFilter", "vtkWindowedSincPolyDataFilter"),
+    ),
+    "vtkFiltersGeneral": ("vtkTransformPolyDataFilter",),
+    "vtkFiltersSources": ("vtkLineSource", "vtkSphereSource"),
+    "vtkImagingGeneral": ("vtkImageGaussianSmooth",),
+    "vtkIOImage": ("vtkPNGWriter",),
+    "vtkRenderingCore": (
+        *("vtkActor", "vtkLight", "vtkPolyDataMapper", "vtkRenderer", "vtkRenderWindow"),
+        "vtkWindowToImageFilter",
+    ),
+    # The factories of OpenGL must be loaded, though nothing names them.
+    "vtkRenderingOpenGL2": (),
+    "util.numpy_support": ("numpy_to_vtk", "vtk_to_numpy"),
+}
+"""The few modules of VTK that are loaded: a quarter of the time of the whole."""
+
+
 def _import_vtk() -> Any:
-    """The few VTK classes needed, as attributes of one namespace."""
-    from types import SimpleNamespace
-
-    # The OpenGL factories must be loaded, though nothing names them.
-    import vtkmodules.vtkRenderingOpenGL2
-    from vtkmodules.util import numpy_support
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
-    from vtkmodules.vtkCommonTransforms import vtkTransform
-    from vtkmodules.vtkFiltersCore import (
-        vtkFlyingEdges3D,
-        vtkPolyDataConnectivityFilter,
-        vtkPolyDataNormals,
-        vtkTubeFilter,
-        vtkWindowedSincPolyDataFilter,
-    )
-    from vtkmodules.vtkFiltersGeneral import vtkTransformPolyDataFilter
-    from vtkmodules.vtkFiltersSources import vtkLineSource, vtkSphereSource
-    from vtkmodules.vtkImagingGeneral import vtkImageGaussianSmooth
-    from vtkmodules.vtkIOImage import vtkPNGWriter
-    from vtkmodules.vtkRenderingCore import (
-        vtkActor,
-        vtkLight,
-        vtkPolyDataMapper,
-        vtkRenderer,
-        vtkRenderWindow,
-        vtkWindowToImageFilter,
-    )
-
-    return SimpleNamespace(**{k: v for k, v in locals().items() if k != "SimpleNamespace"})
+    """The needed VTK classes as attributes of one namespace."""
+    found = SimpleNamespace()
+    for module, names in VTK_CLASSES.items():
+        loaded = import_module(f"vtkmodules.{module}")
+        for name in names:
+            setattr(found, name, getattr(loaded, name))
+    return found
 
 
 def _actor(v: Any, source: Any, color: Any, **look: float) -> Any:
@@ -93,12 +95,12 @@ def _tube(v: Any, start: Any, end: Any, radius: float) -> Any:
 
 
 def _plate(v: Any, outlines: Any) -> Any:
-    """A ring plate from four outlines, shape (4, N, 3): outer top, inner top, inner low, outer low."""
+    """A ring plate from its outlines, shape (4, N, 3): top outer, inner, then low inner, outer."""
     import numpy as np
 
     count = outlines.shape[1]
     points = v.vtkPoints()
-    points.SetData(v.numpy_support.numpy_to_vtk(outlines.reshape(-1, 3).astype(float), deep=True))
+    points.SetData(v.numpy_to_vtk(outlines.reshape(-1, 3).astype(float), deep=True))
     this = np.arange(count)
     after = (this + 1) % count
     quads = [
@@ -161,7 +163,7 @@ def _bone_actors(v: Any, hu: Any, affine: Any) -> list[Any]:
     k, j, i = hu.shape
     image = v.vtkImageData()
     image.SetDimensions(i, j, k)
-    image.GetPointData().SetScalars(v.numpy_support.numpy_to_vtk(hu.ravel(), deep=True))
+    image.GetPointData().SetScalars(v.numpy_to_vtk(hu.ravel(), deep=True))
     blurred = v.vtkImageGaussianSmooth()
     blurred.SetInputData(image)
     blurred.SetStandardDeviations(0.7, 0.7, 0.7)
@@ -252,7 +254,7 @@ def render(folder: Path, v: Any) -> int:
         shot.ReadFrontBufferOff()
         shot.ShouldRerenderOff()
         shot.Update()
-        values = v.numpy_support.vtk_to_numpy(shot.GetOutput().GetPointData().GetScalars())
+        values = v.vtk_to_numpy(shot.GetOutput().GetPointData().GetScalars())
         if values.min() == values.max():
             return EXIT_BLANK
         writer = v.vtkPNGWriter()
