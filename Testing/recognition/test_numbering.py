@@ -11,7 +11,7 @@ from hexafix.errors import (
 from hexafix.geometry import Pose
 from hexafix.hardware import MarkerLayout
 from hexafix.recognition import number_balls
-from hexafix.recognition.choices import UNIQUENESS_LIMIT_MM
+from hexafix.recognition.choices import OTHER_BALLS_LIMIT_MM, UNIQUENESS_LIMIT_MM
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,7 +58,8 @@ def test_every_ball_gets_its_number(
     assert found.unused == tuple(sorted(map(int, where[6:])))
     assert found.settled_by == "layout"
     assert found.rms_mm < 0.3
-    assert found.margin_mm > (1.0 if extra else 5.0)
+    assert found.margin_mm > (1.0 if extra else 7.0)
+    assert found.next_best_is_bound == (extra > 0 and found.next_best_mm >= UNIQUENESS_LIMIT_MM)
     assert found.margin_ratio > 10.0
 
 
@@ -220,6 +221,31 @@ def test_a_missing_ball_names_found_and_needed_per_ring(
         )
     assert words in caught.value.faults[0].what
     assert caught.value.faults[0].hazard == "H13"
+
+
+def test_chance_fits_among_many_balls_do_not_refuse_and_end_soon(
+    image_of_rings, a_proximal_layout, a_distal_layout
+):
+    rings = {"proximal": a_proximal_layout, "distal": a_distal_layout}
+    decided = 0
+    for seed in range(4):
+        points, where, *_ = image_of_rings(*rings.values(), seed=seed, extra=34)
+        try:
+            found = number_balls(points, **rings)
+        except NumberingAmbiguous as refusal:
+            assert "unused ball" in str(refusal)  # noqa: PT017
+            continue
+        decided += 1
+        assert (*found.proximal.balls, *found.distal.balls) == tuple(where[:6])
+        assert found.next_best_mm >= OTHER_BALLS_LIMIT_MM or not found.next_best_is_bound
+    assert decided > 0
+
+
+def test_an_even_ring_stays_ambiguous_among_many_balls(image_of_rings, a_distal_layout):
+    near = layout_at([0, 105, 235])
+    points, *_ = image_of_rings(near, a_distal_layout, seed=1, extra=34)
+    with pytest.raises(NumberingAmbiguous, match="proximal numbers 1,2,3 turned over to 2,1,3"):
+        number_balls(points, proximal=near, distal=a_distal_layout)
 
 
 def test_no_ball_at_all_is_the_wrong_body_part(a_proximal_layout, a_distal_layout):

@@ -31,11 +31,12 @@ NOISE_MM = 0.1
 MAX_CHOICES = 4096
 """Choices of both rings compared one by one; more mean a hopeless symmetry."""
 
-WIDER_MM = (10.0, 20.0, 40.0)
-"""RMS up to which the next best relabelling is looked for when there is none nearer."""
+MANY_BALLS = 30
+"""Above this count chance fits are listed to a narrower RMS."""
 
-WIDER_PARTIAL = 2_000
-"""Bound of that search's work; beyond, the next best is only bounded."""
+WIDER_MM, WIDER_MARKERS, WIDER_PARTIAL = (10.0, 20.0, 40.0), 6, 2_000
+"""RMS up to which the next best relabelling is looked for when there is none nearer, the most
+markers a ring for which that is cheap, and the bound of its work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,22 +67,52 @@ class Choices:
 
 
 def search_limit_mm(noise_mm: float) -> float:
-    """RMS up to which every choice is listed."""
+    """RMS below which the same balls under other numbers are ambiguous (H18)."""
     return max(UNIQUENESS_LIMIT_MM, UNIQUENESS_NOISE_FACTOR * noise_mm)
+
+
+def other_balls_limit_mm(noise_mm: float) -> float:
+    """RMS below which a choice with other balls is ambiguous."""
+    return max(OTHER_BALLS_LIMIT_MM, UNIQUENESS_NOISE_FACTOR * noise_mm)
 
 
 def search(
     points: Array, *, proximal: MarkerLayout, distal: MarkerLayout, noise_mm: float
 ) -> Choices:
-    """All disjoint choices of both rings up to the RMS that matters; points (M, 3), LPS mm."""
-    limit = search_limit_mm(noise_mm)
-    found = [
-        embeddings(points_mm=points, layout_mm=layout.points_mm, max_rms_mm=limit)
-        if len(points) >= len(layout)
-        else Embeddings(np.zeros((0, len(layout)), int), np.zeros(0), complete=True)
-        for layout in (proximal, distal)
+    """All disjoint choices of both rings up to the RMS that matters; points (M, 3), LPS mm.
+
+    Among more than `MANY_BALLS` chance fits abound: there, choices with other balls than the
+    best one's are listed to `other_balls_limit_mm` only.
+    """
+    layouts = (proximal, distal)
+    wide, narrow = search_limit_mm(noise_mm), other_balls_limit_mm(noise_mm)
+    many = len(points) > MANY_BALLS
+    found = [_fits(points, layout, narrow if many else wide) for layout in layouts]
+    choices = joined(found[0], found[1], len(points))
+    if not many or len(choices.rms_mm) == 0:
+        return choices
+    used = np.sort(np.concatenate(choices.balls(0)))
+    merged = [
+        _united(one, _fits(points[used], layout, wide), used)
+        for one, layout in zip(found, layouts, strict=True)
     ]
-    return joined(found[0], found[1], len(points))
+    return joined(merged[0], merged[1], len(points))
+
+
+def _fits(points: Array, layout: MarkerLayout, limit_mm: float) -> Embeddings:
+    """Embeddings of one layout, none if there are too few balls."""
+    if len(points) < len(layout):
+        return Embeddings(np.zeros((0, len(layout)), int), np.zeros(0), complete=True)
+    return embeddings(points_mm=points, layout_mm=layout.points_mm, max_rms_mm=limit_mm)
+
+
+def _united(all_balls: Embeddings, of_used: Embeddings, used: NDArray[np.intp]) -> Embeddings:
+    """Embeddings of both searches, each once, best first."""
+    balls = np.vstack([all_balls.balls, used[of_used.balls]])
+    rms = np.concatenate([all_balls.rms_mm, of_used.rms_mm])
+    _, first = np.unique(balls, axis=0, return_index=True)
+    first = first[np.argsort(rms[first], kind="stable")]
+    return Embeddings(balls[first], rms[first], all_balls.complete and of_used.complete)
 
 
 def joined(proximal: Embeddings, distal: Embeddings, ball_count: int) -> Choices:
@@ -103,15 +134,14 @@ def joined(proximal: Embeddings, distal: Embeddings, ball_count: int) -> Choices
 
 def ambiguous_rows(choices: Choices, best: int, *, noise_mm: float) -> list[int]:
     """Rows of the choices that cannot be told from row `best` by the layouts."""
-    noise = UNIQUENESS_NOISE_FACTOR * max(noise_mm, 0.0)
+    same_limit, other_limit = search_limit_mm(noise_mm), other_balls_limit_mm(noise_mm)
     used = set().union(*choices.balls(best))
     rivals = []
     for row, rms in enumerate(choices.rms_mm):
         if row == best:
             continue
         same = used == set().union(*choices.balls(row))
-        limit = max(UNIQUENESS_LIMIT_MM if same else OTHER_BALLS_LIMIT_MM, noise)
-        if rms < limit:
+        if rms < (same_limit if same else other_limit):
             rivals.append(row)
     return rivals
 
@@ -123,19 +153,18 @@ def next_best_mm(
     *,
     proximal: MarkerLayout,
     distal: MarkerLayout,
-    searched_mm: float,
+    noise_mm: float,
 ) -> tuple[float, bool]:
-    """RMS of the best other choice, mm, and whether it is only a lower bound.
-
-    Beyond `searched_mm`, the RMS up to which `choices` is full, only the balls of the chosen row
-    are searched.
-    """
+    """RMS of the best choice other than `row`, mm, and whether it is only a lower bound."""
+    many = len(points) > MANY_BALLS
+    reached = other_balls_limit_mm(noise_mm) if many else search_limit_mm(noise_mm)
     others = np.delete(choices.rms_mm, row)
-    if len(others):
+    if len(others) and others[0] <= reached:
         return float(others[0]), False
     balls = choices.balls(row)
     used = [*balls[0], *balls[1]]
-    reached = searched_mm
+    if len(used) < len(points) or max(map(len, balls)) > WIDER_MARKERS:
+        return reached, True
     for limit in WIDER_MM:
         found = [
             embeddings(

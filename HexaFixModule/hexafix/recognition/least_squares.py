@@ -29,7 +29,7 @@ IMAGE_SIGMA_MM = 0.3
 RING_RMS_LIMIT_MM = 0.5
 """Largest RMS of a ring's balls against its layout (G2).
 
-With the installation tolerance and balls located to 0.03 mm the RMS stays below 0.17 mm in 999 of
+With the installation tolerance and balls located to 0.03 mm the RMS stays below 0.18 mm in 999 of
 1 000 rings; a pixel spacing wrong by 1 % gives 0.79 mm on an 80 mm ring and must be refused. At
 the paper's 0.3 mm a good ring of three balls is refused once in 20: that CT is too coarse.
 """

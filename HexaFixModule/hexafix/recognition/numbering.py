@@ -17,7 +17,6 @@ from hexafix.recognition.choices import (
     ambiguous_rows,
     next_best_mm,
     search,
-    search_limit_mm,
 )
 from hexafix.recognition.least_squares import RING_RMS_LIMIT_MM, RingPose, ring_pose
 from hexafix.recognition.numbering_refusals import ambiguous, not_found
@@ -246,7 +245,7 @@ def numbering_value(
         row,
         proximal=proximal,
         distal=distal,
-        searched_mm=search_limit_mm(noise_mm),
+        noise_mm=noise_mm,
     )
     return Numbering(
         RingNumbering(proximal.numbers, balls_a, float(choices.proximal.rms_mm[a])),

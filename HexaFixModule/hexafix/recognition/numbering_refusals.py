@@ -69,14 +69,14 @@ def not_found(
             mirrored=True,
         )
         if len(points) >= len(layout) and len(mirrored):
-            near = f"{found.rms_mm[0]:.2f} mm" if len(found) else "above 5 mm"
+            near = f"{found.rms_mm[0]:.2f} mm" if len(found) else "no fit"
             return ImageRefused.of(
                 "mirrored-balls",
                 f"the {side} ring's balls are the mirror image of its layout",
                 value=f"RMS {near} as built, {mirrored.rms_mm[0]:.2f} mm mirrored",
                 limit=f"{RING_RMS_LIMIT_MM:g} mm as built",
                 hazard="H01",
-                next_step="check the image's orientation and the signs of the layout's heights",
+                next_step="check the image's orientation and the signs of the heights",
             )
         count = matched_count(points, layout.points_mm, limit_mm=RING_RMS_LIMIT_MM)
         nearest = f", all {len(layout)} only to {found.rms_mm[0]:.2f} mm" if len(found) else ""
