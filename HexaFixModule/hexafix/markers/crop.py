@@ -68,10 +68,10 @@ class Crop:
         tuple of float
             Median, robust standard deviation, and share at the crop's greatest value.
         """
-        away = self.points_mm - center_mm
-        values = self.voxels[np.einsum("...i,...i", away, away) < reach_mm**2]
-        if not len(values):
-            return float("nan"), 0.0, 0.0
+        index = self.volume.ijk_from_lps(center_mm + reach_mm * _BALL) - self.first_ijk
+        index = np.rint(index).astype(int)
+        np.clip(index, 0, np.array(self.voxels.shape)[::-1] - 1, out=index)
+        values = self.voxels[index[:, 2], index[:, 1], index[:, 0]]
         middle = float(np.median(values))
         noise = 1.4826 * float(np.median(np.abs(values - middle)))
         return middle, noise, float(np.mean(values >= self.brightest))
@@ -80,3 +80,13 @@ class Crop:
     def brightest(self) -> float:
         """The greatest value of the crop."""
         return float(self.voxels.max())
+
+
+def _ball_lattice(count: int) -> NDArray[np.float64]:
+    """Points of a cubic lattice in the unit ball, `count` across."""
+    line = np.linspace(-1.0, 1.0, count)
+    points = np.stack(np.meshgrid(line, line, line), -1).reshape(-1, 3)
+    return points[np.einsum("ni,ni->n", points, points) <= 1.0]
+
+
+_BALL = _ball_lattice(9)

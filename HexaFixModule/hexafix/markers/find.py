@@ -67,11 +67,19 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
     """
     _check_diameter(volume, ball_diameter_mm)
     radius = ball_diameter_mm / 2.0
-    points = candidate_centers(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
+    points, sizes = candidate_centers(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
     fitted: list[_Fitted] = []
     rejected: list[Rejected] = []
-    for number, point in enumerate(points[:MOST_LOCAL]):
-        progress("fitting balls", number / min(len(points), MOST_LOCAL))
+    count = 0
+    for number, (point, size) in enumerate(zip(points, sizes, strict=True)):
+        progress("fitting balls", number / len(points))
+        result = predicates.size_failure(size, radius)
+        if result is not None:
+            rejected.append(Rejected(point, result))
+            continue
+        count += 1
+        if count > MOST_LOCAL:
+            break
         result = _judge(volume, point, radius)
         if isinstance(result, Rejected):
             rejected.append(result)
@@ -82,7 +90,7 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
     balls = tuple(sorted((f.ball for f in fitted), key=lambda b: tuple(b.center_mm[::-1])))
     away = _distinct(rejected + doubled + odd, balls, radius)
     progress("fitting balls", 1.0)
-    return BallSet(balls, away, _warnings(volume, balls, len(points)))
+    return BallSet(balls, away, _warnings(volume, balls, crowded=count > MOST_LOCAL))
 
 
 def _check_diameter(volume: Volume, diameter: float) -> None:
@@ -219,7 +227,7 @@ def _distinct(
     return tuple(listed[:MOST_LISTED])
 
 
-def _warnings(volume: Volume, balls: tuple[Ball, ...], candidates: int) -> tuple[str, ...]:
+def _warnings(volume: Volume, balls: tuple[Ball, ...], *, crowded: bool) -> tuple[str, ...]:
     """What concerns the whole search."""
     warnings = []
     thickest = float(volume.spacing_mm.max())
@@ -228,8 +236,8 @@ def _warnings(volume: Volume, balls: tuple[Ball, ...], candidates: int) -> tuple
             f"slices are {thickest:.2f} mm apart (limit {THICK_SLICES_MM:g} mm): "
             "centres come from the model fit and are less certain"
         )
-    if candidates > MOST_LOCAL:
-        warnings.append(f"{candidates} places looked like a ball, {MOST_LOCAL} were fitted")
+    if crowded:
+        warnings.append(f"more than {MOST_LOCAL} places look like a ball: the roundest were fitted")
     if len(balls) > 2:
         cores = [ball.core_hu for ball in balls]
         if max(cores) - min(cores) > 0.3 * (max(cores) + 1000.0):

@@ -12,11 +12,12 @@ from hexafix.markers.crop import Crop
 
 INSIDE_MM, OUTSIDE_MM = 2.5, 2.0
 """Voxels from this far inside to this far outside the nominal radius take part."""
-MOST_VOXELS = 1500
+MOST_VOXELS = 1200
 """More voxels than these are thinned evenly; the gate needs no more."""
 CUT_MARGIN_RAD = 0.07
 """Half the distance of neighbouring rays, about."""
 TUKEY = 4.685
+MOST_STEPS, SETTLED_MM = 25, 5e-4
 SIGMA_RANGE_MM = (0.15, 3.0)
 
 
@@ -79,38 +80,39 @@ def fit_model(
     state = np.array([0.0, 0.0, 0.0, radius_mm, 0.6, 0.7])
     free = np.array([1, 1, 1, clip_hu is None, 1, 1], bool)
     basis = _polynomials(points / radius_mm)
-    tukey = np.ones(len(values))
-    linear = np.zeros(14)
-    normal, rms = np.eye(20), 0.0
-    for step in range(25):
+    linear, tukey = np.zeros(14), np.ones(len(values))
+    rise, residual, normal = tukey, values, np.eye(14)
+    for step in range(MOST_STEPS):
         share, slope = _ball_and_slopes(points, state, axis, nodes, weights)
         columns = np.hstack([basis[:, :4] * share[:, None], basis * (1.0 - share)[:, None]])
-        linear = _solve(columns, values, tukey)
+        if step == 0:
+            linear = _step(columns, values, tukey)[0]
         residual = values - columns @ linear
-        scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
         if step >= 2:
+            scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
             tukey = np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
         rise = basis[:, :4] @ linear[:4] - basis @ linear[4:]
         jacobian = np.hstack([slope[:, free] * rise[:, None], columns])
-        normal = jacobian.T @ (tukey[:, None] * jacobian)
-        damped = normal + np.diag(1e-7 * np.diag(normal) + 1e-9)
-        change = np.linalg.solve(damped, jacobian.T @ (tukey * residual))[: free.sum()]
-        change = np.clip(change, -0.4, 0.4)
-        state[free] += change
+        change, normal = _step(jacobian, residual, tukey)
+        linear = linear + change[free.sum() :]
+        state[free] += np.clip(change[: free.sum()], -0.4, 0.4)
         state[4:] = np.clip(state[4:], *SIGMA_RANGE_MM)
-        rms = float(np.sqrt(np.sum(tukey * residual**2) / max(1.0, np.sum(tukey))))
-        if step > 3 and np.abs(change[:3]).max() < 2e-4:
+        if step > 2 and np.abs(change[:3]).max() < SETTLED_MM:
             break
     else:
         return None
     if np.linalg.norm(state[:3]) > 0.5 * radius_mm:
         return None
-    covariance = rms**2 * np.linalg.pinv(normal)[:3, :3]
-    contrast = float(np.median(basis[:, :4] @ linear[:4] - basis @ linear[4:]))
+    rms = float(np.sqrt(np.sum(tukey * residual**2) / max(1.0, np.sum(tukey))))
     return ModelFit(
-        np.asarray(start_mm) + state[:3], float(state[3]), float(state[4]), float(state[5]),
-        contrast, rms, covariance,
-    )  # fmt: skip
+        center_mm=np.asarray(start_mm) + state[:3],
+        radius_mm=float(state[3]),
+        sigma_plane_mm=float(state[4]),
+        sigma_slice_mm=float(state[5]),
+        contrast_hu=float(np.median(rise)),
+        rms_hu=rms,
+        covariance_mm2=np.asarray(rms**2 * np.linalg.inv(normal)[:3, :3], float),
+    )
 
 
 def _band(
@@ -189,9 +191,12 @@ def _polynomials(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.ones_like(a), a, b, c, a * a, b * b, c * c, a * b, a * c, b * c], axis=-1)
 
 
-def _solve(columns: NDArray, values: NDArray, weight: NDArray) -> NDArray[np.float64]:
-    """Weighted least squares by the damped normal equations."""
-    normal = columns.T @ (weight[:, None] * columns)
-    normal[np.diag_indices_from(normal)] *= 1.0 + 1e-7
-    normal[np.diag_indices_from(normal)] += 1e-9
-    return np.linalg.solve(normal, columns.T @ (weight * values))
+def _step(
+    columns: NDArray[np.float64], values: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weighted least squares by the slightly damped normal equations: solution and matrix."""
+    weighted = weight[:, None] * columns
+    normal = columns.T @ weighted
+    diagonal = np.diag_indices_from(normal)
+    normal[diagonal] += 1e-7 * normal[diagonal] + 1e-9
+    return np.linalg.solve(normal, weighted.T @ values), normal

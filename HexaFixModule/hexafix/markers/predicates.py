@@ -50,6 +50,17 @@ def border_failure(volume: Volume, center_mm: NDArray[np.float64], radius_mm: fl
     return f"border: {distance:.1f} mm from the edge of the volume, limit {limit:.1f} mm"
 
 
+def size_failure(found_mm: float, radius_mm: float) -> str | None:
+    """Reason when the first look shows another size beyond doubt."""
+    wide = 0.15 * radius_mm + 0.45
+    if abs(found_mm - radius_mm) <= wide:
+        return None
+    return (
+        f"radius: about {found_mm:.1f} mm, "
+        f"limit {radius_mm - wide:.1f} to {radius_mm + wide:.1f} mm at first look"
+    )
+
+
 def shape_failures(
     volume: Volume, rays: RayFit, *, fitted_mm: float, radius_mm: float, slack: float = 1.0
 ) -> Iterator[str]:

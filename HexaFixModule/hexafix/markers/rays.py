@@ -30,6 +30,8 @@ SMOOTH_RAD = 0.08
 WEAK_SHARE = 0.4
 """Edges weaker than this share of the median are dropped."""
 TUKEY = 4.685
+MARGIN_RAD = 0.31
+"""Widening of the rod's side: its cone opens from the shell to the ball, and it is blurred."""
 FEW_LEFT = 0.45
 """With fewer directions left than this share, antipodes of cut directions are kept."""
 
@@ -192,7 +194,7 @@ def _bright_side(shell: NDArray[np.float64], outside: float, core_hu: float) -> 
         bright = mild > outside + 0.4 * (core_hu - outside)
     if not bright.any():
         return np.zeros(len(shell), bool)
-    wide = (directions @ directions[bright].T).max(axis=1) > np.cos(np.radians(10.0))
+    wide = (directions @ directions[bright].T).max(axis=1) > np.cos(MARGIN_RAD)
     both = wide | np.roll(wide, len(shell) // 2)
     return both if 1.0 - both.mean() >= FEW_LEFT else wide
 
@@ -209,9 +211,9 @@ def _sphere(
     weight = usable.astype(float)
     residual = np.zeros(len(points))
     normal = np.eye(4)
-    for _ in range(12):
+    for _ in range(10):
         away = points - shift
-        length = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+        length = np.maximum(np.sqrt(np.einsum("ni,ni->n", away, away)), 1e-9)
         residual = np.where(usable, length - size, 0.0)
         scale = 1.4826 * float(np.median(np.abs(residual[usable]))) + 1e-4
         weight = usable * np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
@@ -220,6 +222,6 @@ def _sphere(
         normal[np.diag_indices(4)] += 1e-9
         change = np.linalg.solve(normal, rows.T @ (weight * residual))
         shift, size = shift + change[:3], size + float(change[3])
-        if np.abs(change).max() < 1e-4:
+        if np.abs(change).max() < 2e-4:
             break
     return center + shift, size, residual, weight, normal

@@ -20,10 +20,11 @@ COARSE_MM = 2.0
 """Pitch of the first look, never more than a fifth of the ball's diameter."""
 BRIGHT_LITRES = 1.6
 """The first look takes in the brightest matter of the volume up to this amount."""
-DARK_SHARE = 0.55
+DARK_SHARE = 0.62
 """Least share of directions in which the brightness has fallen to half outside a ball."""
-ROUNDS = ((32, 0.9, 0.35), (64, 0.50, 0.50), (64, 0.35, 0.65))
-"""Rounds of rays: how many, share of the radius by which a crossing may miss, least hits."""
+ROUNDS = ((24, 1.0, 0.9, 0.35), (48, 0.625, 0.50, 0.50), (64, 0.625, 0.35, 0.65))
+"""Rounds of rays: how many, pitch along them in mm for a radius of 5 mm, share of the radius by
+which a crossing may miss, least share of rays that hit."""
 ON_SPHERE = 0.10
 """A hit lies this share of the radius from the fitted sphere."""
 CHUNK = 16_384
@@ -32,7 +33,7 @@ CHUNK = 16_384
 
 def candidate_centers(
     volume: Volume, *, ball_diameter_mm: float, progress: Progress
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places where a ball of the given diameter could be, the roundest first.
 
     Parameters
@@ -43,8 +44,10 @@ def candidate_centers(
 
     Returns
     -------
-    ndarray, shape (M, 3)
-        Centres to about a voxel, LPS mm.
+    centers : ndarray, shape (M, 3)
+        To about a voxel, LPS mm.
+    radii : ndarray, shape (M,)
+        To about half a voxel, mm.
     """
     radius = ball_diameter_mm / 2.0
     pitch = min(COARSE_MM, ball_diameter_mm / 5.0)
@@ -53,14 +56,17 @@ def candidate_centers(
     seeds = _coarse_seeds(volume.voxels, step, volume.spacing_mm * step, radius)
     progress("finding balls", 0.6)
     centers = seeds * step
-    for rays, slack, least in ROUNDS:
-        centers, hits = _ray_round(volume, centers, radius, rays=rays, slack=slack)
-        order = np.argsort(-hits, kind="stable")
-        order = order[hits[order] >= least]
-        centers = centers[order]
-        centers = centers[_far_apart(centers * volume.spacing_mm, 0.25 * radius)]
+    radii = np.empty(len(centers))
+    for rays, pitch, slack, least in ROUNDS:
+        moved = _ray_round(
+            volume, centers, radius, rays=rays, step=0.2 * pitch * radius, slack=slack
+        )
+        order = np.argsort(-moved[2], kind="stable")
+        order = order[moved[2][order] >= least]
+        order = order[_far_apart(moved[0][order] * volume.spacing_mm, 0.25 * radius)]
+        centers, radii = moved[0][order], moved[1][order]
     progress("finding balls", 1.0)
-    return volume.lps_from_ijk(centers)
+    return volume.lps_from_ijk(centers), radii
 
 
 def _coarse_seeds(
@@ -153,24 +159,30 @@ def _far_apart(points: NDArray[np.float64], reach: float) -> NDArray[np.int64]:
 
 
 def _ray_round(
-    volume: Volume, centers: NDArray[np.float64], radius: float, *, rays: int, slack: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres (i, j, k) moved to the sphere of their half-height crossings, and shares of hits."""
-    step = 0.125 * radius
-    distance = np.arange(0.0, radius + 2.5, step)
+    volume: Volume,
+    centers: NDArray[np.float64],
+    radius: float,
+    *,
+    rays: int,
+    step: float,
+    slack: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Spheres through the half-height crossings: centres (i, j, k), radii, shares of hits."""
+    distance = np.arange(0.0, radius + 2.0 + step, step)
     inverse = np.linalg.inv(volume.ijk_to_lps[:3, :3])
     directions = sphere_directions(rays)
     jumps = np.rint((distance[:, None, None] * directions) @ inverse.T).astype(np.int64)
-    moved, hits = [np.empty((0, 3))], [np.empty(0)]
+    moved, radii, hits = [np.empty((0, 3))], [np.empty(0)], [np.empty(0)]
     for start in range(0, len(centers), 128):
         near = np.rint(centers[start : start + 128]).astype(np.int64)
         profile = _profiles(volume, near, jumps)
         reach, crossed = _half_height(profile, distance, radius)
         crossed &= np.abs(reach - radius) < slack * radius
-        shift, hit = _sphere_shift(reach[..., None] * directions, crossed)
+        shift, size, hit = _sphere_shift(reach[..., None] * directions, crossed)
         moved.append(near + shift @ inverse.T)
+        radii.append(size)
         hits.append(hit)
-    return np.concatenate(moved), np.concatenate(hits)
+    return np.concatenate(moved), np.concatenate(radii), np.concatenate(hits)
 
 
 def _profiles(
@@ -206,12 +218,12 @@ def _half_height(
 
 def _sphere_shift(
     edge: NDArray[np.float64], near: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Algebraic sphere centres, (M, 3), of edge points, (M, n, 3), and the shares that hit."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Algebraic sphere centres, (M, 3), and radii of edge points, (M, n, 3); shares that hit."""
     rows = np.concatenate([edge, np.ones_like(edge[..., :1])], axis=-1)
     right = 0.5 * np.sum(edge**2, axis=-1)[..., None]
     weight = near.astype(float)
-    center, hit = np.zeros((len(edge), 3)), near
+    center, size, hit = np.zeros((len(edge), 3)), np.zeros(len(edge)), near
     for _ in range(2):
         weighted = np.swapaxes(rows * weight[..., None], 1, 2)
         solution = np.linalg.solve(weighted @ rows + 1e-6 * np.eye(4), weighted @ right)[..., 0]
@@ -220,7 +232,7 @@ def _sphere_shift(
         miss = np.abs(np.linalg.norm(edge - center[:, None], axis=-1) - size[:, None])
         hit = near & (miss < ON_SPHERE * size[:, None])
         weight = near * np.where(hit, 1.0, 0.1)
-    return center, hit.mean(axis=1)
+    return center, size, hit.mean(axis=1)
 
 
 _FACES = np.vstack([np.eye(3), -np.eye(3)])
