@@ -154,18 +154,13 @@ def check_layout(
     spread = np.linalg.svd(points - points.mean(axis=0))
     normal = spread[2][2]
     along = points @ normal
-    errors = {
-        "sigma_image_mm": sigma_image_mm,
-        "sigma_installation_mm": sigma_installation_mm,
-        "covariances_mm2": covariances_mm2,
-    }
-    fit = (
-        volume_error(least_squares_covariance(layout, **errors)) if height > COLLINEAR_MM else None
+    fit, groups = _predicted(
+        layout,
+        height,
+        sigma_image_mm=sigma_image_mm,
+        sigma_installation_mm=sigma_installation_mm,
+        covariances_mm2=covariances_mm2,
     )
-    try:
-        groups = volume_error(group_covariance(layout, **errors))
-    except LayoutRejected:
-        groups = None
     uniqueness, order = best_relabelling(layout)
     angles = layout.included_angles_rad.copy()
     angles.setflags(write=False)
@@ -183,6 +178,20 @@ def check_layout(
         group_error_mm=float(groups[0]) if groups else None,
         group_error_rad=float(groups[1]) if groups else None,
     )
+
+
+def _predicted(
+    layout: MarkerLayout, height_mm: float, **errors: Any
+) -> tuple[tuple[Array, Array] | None, tuple[Array, Array] | None]:
+    """Volume errors of the least-squares and the group pose, None where there is no pose."""
+    fit = None
+    if height_mm > COLLINEAR_MM:
+        fit = volume_error(least_squares_covariance(layout, **errors))
+    try:
+        groups = volume_error(group_covariance(layout, **errors))
+    except LayoutRejected:
+        groups = None
+    return fit, groups
 
 
 def angle_rule(layout: MarkerLayout) -> str:
