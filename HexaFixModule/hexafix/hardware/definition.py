@@ -70,7 +70,7 @@ def read_fixator(path: str | Path) -> Fixator:
             where=str(file),
             next_step="check the path",
         ) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise HardwareDefinitionError.of(
             "hardware-not-json",
             f"the hardware definition is not valid JSON: {error}",

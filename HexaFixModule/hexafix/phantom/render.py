@@ -81,14 +81,15 @@ def render(
 def noise_response(grid: Grid, correlation_mm: float) -> NDArray[np.float32] | None:
     """Frequency response, shape (J, I // 2 + 1), of unit variance; None: white noise.
 
-    The shape is that of filtered back-projection: rising with the frequency, then cut off.
+    The shape is that of filtered back-projection: rising with the frequency, most at about
+    0.24 / correlation, then cut off.
     """
     if correlation_mm <= 0.0:
         return None
     ni, nj, _ = grid.size_ijk
     spacing = grid.spacing_mm
     f = np.hypot(fft.fftfreq(nj, spacing[1])[:, None], fft.rfftfreq(ni, spacing[0])[None, :])
-    scaled = f * correlation_mm
+    scaled = 2.0 * f * correlation_mm
     response = (0.15 + scaled) * np.exp(-((1.5 * scaled) ** 2))
     twice = np.full(response.shape[1], 2.0)
     twice[0] = 1.0

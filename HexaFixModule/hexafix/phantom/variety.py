@@ -16,7 +16,7 @@ from hexafix.phantom.scene import build_scene
 from hexafix.phantom.spec import PhantomSpec
 from hexafix.recognition.rigid import rigid_rms_mm
 
-TRIES = 400
+TRIES = 100
 SURE_NUMBERS_MM = 10.0
 """Least RMS of a drawn layout against itself under wrong numbers: the numbering must be sure."""
 
