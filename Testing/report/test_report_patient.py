@@ -40,11 +40,15 @@ def test_every_single_arrow_follows_the_sign_of_its_own_turn(a_plan):
         (["2.0", "1.5"], "shorter"),
         (["2.0", "2.0"], "no change"),
         (["1.0", "2.0", "1.0"], "first longer, then shorter"),
-        (["1.0", "2.0", "1.0", "2.0"], "changes direction: watch the arrows"),
+        (["1.0", "3.0", "1.0", "3.0"], "both ways, see arrows"),
+        (["1.0", "2.0", "1.5", "3.0", "2.5", "4.0"], "mostly longer"),
+        (["4.0", "3.0", "3.5", "2.0"], "mostly shorter"),
+        (["4.0", "3.0", "4.0", "2.0", "3.0"], "both ways, see arrows"),
+        (["9.5", "11.0", "9.5", "9.0"], "first longer, then shorter"),
     ],
 )
 def test_the_whole_direction_names_a_turning_point(values, word):
-    assert whole_direction(values) == word
+    assert whole_direction(values, 0.5) == word
 
 
 def test_values_are_compared_as_numbers_not_as_words():
@@ -82,7 +86,8 @@ def test_the_facts_count_the_plan(a_plan):
     facts = dict(patient_content(a_plan)["facts"])
     assert facts["First day"] == "Tuesday 1 December 2026"
     assert facts["Last day"] == "Saturday 12 December 2026"
-    assert facts["Adjustments in all"] == "48"
+    assert facts["In all"] == "12 days, 48 adjustments"
+    assert facts["Each day"] == "4 adjustments: morning, noon, evening, night"
 
 
 @pytest.mark.parametrize(
@@ -95,3 +100,14 @@ def test_the_warning_signs_speak_of_the_right_limb(bone, word):
 def test_no_instruction_uses_a_bare_sign_for_a_direction():
     lines = [*words.adjustment_steps(4), *words.MISSED, words.DONE_TWICE]
     assert not any("+" in line or "−" in line for line in lines)
+
+
+def test_a_strut_that_goes_both_ways_has_no_single_direction_in_its_head(a_plan):
+    for k, row in enumerate(a_plan["schedule"]["rows"]):
+        row["strut_mm"][1] = 166.0 + (10.0 if 10 < k < 20 else 0.0)
+        row["strut_mm"][2] = 160.0 + 0.5 * (k % 2) + 0.5 * (k // 2)
+    entries = strut_summary(a_plan)
+    assert (entries[1]["head"], entries[1]["arrow"]) == ("see arrows", "▲▼")
+    assert entries[1]["direction"] == "first longer, then shorter"
+    assert entries[0]["head"] == "shorter"
+    assert entries[2]["head"] == "longer"

@@ -111,6 +111,43 @@ def test_the_table_head_repeats_on_every_page_of_the_table(long_pages):
     assert all("1 shorter 2 longer 3 longer 4 longer 5 longer 6 shorter" in head for head in heads)
 
 
+def test_a_restless_plan_keeps_the_phone_numbers_on_the_first_page(a_plan):
+    for k, row in enumerate(a_plan["schedule"]["rows"][1:]):
+        row["strut_mm"] = [160.0 + (8.0 if 10 < k < 30 else 0.5 * n) for n in range(6)]
+    a_plan["limb"]["bone"] = "proximal tibia and fibula shaft"
+    a_plan["case_id"] = "A" + "b-4_" * 15 + "xyz"
+    a_plan["notice"] = "Research software. Not a medical device. " + "Long notice words. " * 4
+    pages = _pages(prescription_pdf(a_plan))
+    assert "Phone at night" in pages[0]
+    for page in pages:
+        assert a_plan["case_id"] in page
+        assert "LEFT PROXIMAL TIBIA AND FIBULA SHAFT" in page
+
+
+def test_the_six_parameters_of_a_deformity_are_printed_with_their_sense(a_plan):
+    a_plan["case"]["correction"] = {
+        "kind": "deformity",
+        "moving": "distal",
+        "origin_lps_mm": [1.0, 2.0, 3.0],
+        "ap_angulation_deg": 8.5,
+        "ap_angulation": "varus",
+        "axial_translation_mm": 12.0,
+        "axial_translation": "short",
+    }
+    text = " ".join(" ".join(_pages(prescription_pdf(a_plan))).split())
+    assert "AP angulation 8.500 ° varus" in text
+    assert "axial translation 12.00 mm short" in text
+    assert "at the origin L, P, S = 1.000, 2.000, 3.000 mm" in text
+
+
+def test_warnings_of_image_and_balls_are_printed(a_plan):
+    a_plan["image"]["warnings"] = ["slices are 3.0 mm apart"]
+    a_plan["balls"][2]["warnings"] = ["5 % of its voxels are clipped"]
+    text = " ".join(" ".join(_pages(prescription_pdf(a_plan))).split())
+    assert "slices are 3.0 mm apart" in text
+    assert "Ball 3: 5 % of its voxels are clipped" in text
+
+
 def test_no_day_is_torn_apart_by_a_page(long_pages):
     for page in long_pages:
         assert page.count("1 of 4") == page.count("4 of 4")

@@ -31,13 +31,11 @@ class _Places:
 
     def choose(self, candidates: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
         """The candidate farthest from all taken places (35 mm is far enough); it is then taken."""
-
-        def room(point: NDArray[np.float64]) -> float:
-            nearest = min(float(np.linalg.norm(point - other)) for other in self._taken)
-            edge = min(*point, self._view.width_mm - point[0], self._view.height_mm - point[1])
-            return min(nearest, 35.0) if edge > 22.0 else -1.0
-
-        best = max(candidates, key=room)
+        points = np.array(list(candidates), float)
+        apart = np.linalg.norm(points[:, None] - np.array(self._taken), axis=-1).min(axis=1)
+        far_edge = np.array([self._view.width_mm, self._view.height_mm])
+        edge = np.minimum(points, far_edge - points).min(axis=1)
+        best = points[int(np.argmax(np.where(edge > 22.0, np.minimum(apart, 35.0), -1.0)))]
         self._taken.append(best)
         return best
 

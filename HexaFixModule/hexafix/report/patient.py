@@ -32,16 +32,38 @@ def direction(before: str, after: str) -> str:
     return words.LONGER if change > 0 else words.SHORTER if change < 0 else words.SAME
 
 
-def whole_direction(values: Sequence[str]) -> str:
-    """The direction of one strut over the whole plan, turning points named."""
+def whole_direction(values: Sequence[str], step_mm: float) -> str:
+    """The direction of one strut over the whole plan in words.
+
+    Parameters
+    ----------
+    values : sequence of str
+        Printed values, first to last.
+    step_mm : float
+        The strut's step: ways back of no more than one step are called ``mostly longer``.
+    """
     steps = [direction(a, b) for a, b in pairwise(values)]
     turns = [step for step in steps if step != words.SAME]
     runs = [step for k, step in enumerate(turns) if k == 0 or step != turns[k - 1]]
     if len(runs) <= 1:
         return runs[0] if runs else words.SAME
+    overall = direction(values[0], values[-1])
+    if overall != words.SAME and _way_back(values, overall) <= Decimal(str(step_mm)):
+        return f"mostly {overall}"
     if len(runs) == 2:
         return f"first {runs[0]}, then {runs[1]}"
-    return "changes direction: watch the arrows"
+    return "both ways, see arrows"
+
+
+def _way_back(values: Sequence[str], overall: str) -> Decimal:
+    """The farthest a strut goes against its overall direction, mm."""
+    sign = 1 if overall == words.LONGER else -1
+    farthest, back = Decimal("-Infinity"), Decimal(0)
+    for value in values:
+        along = sign * Decimal(value)
+        farthest = max(farthest, along)
+        back = max(back, farthest - along)
+    return back
 
 
 def printed_values(document: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -54,19 +76,22 @@ def strut_summary(document: dict[str, Any]) -> list[dict[str, str]]:
     """One entry a strut: number, colour, direction in words, first and last value, change."""
     table = printed_values(document)
     changes = format_change(table[0], table[-1])
+    step_mm = document["schedule"]["strut_step_mm"]
     summary = []
     for index, colour in enumerate(words.STRUT_COLOURS):
         column = [row[index] for row in table]
         overall = direction(column[0], column[-1])
+        whole = whole_direction(column, step_mm)
         summary.append(
             {
                 "number": str(index + 1),
                 "colour": colour.name,
                 "fill": colour.fill,
                 "ink": colour.ink,
-                "direction": whole_direction(column),
-                "arrow": words.ARROWS[overall],
+                "direction": whole,
+                "arrow": words.ARROWS[overall] if whole.endswith(overall) else "▲▼",
                 "overall": overall,
+                "head": whole if whole.endswith(overall) else "see arrows",
                 "start": column[0],
                 "end": column[-1],
                 "change": changes[index],
@@ -119,13 +144,13 @@ def patient_content(document: dict[str, Any]) -> dict[str, Any]:
     first = parse_date(schedule["start_date"])
     last = parse_date(schedule["rows"][-1]["date"])
     times = words.TIMES_OF_DAY.get(per_day)
+    often = "1 adjustment" if per_day == 1 else f"{per_day} adjustments"
     return {
         "facts": [
             ["First day", long_date(first)],
             ["Last day", long_date(last)],
-            ["Days", str(schedule["days"])],
-            ["Adjustments a day", f"{per_day}" + (f": {', '.join(times)}" if times else "")],
-            ["Adjustments in all", str(len(schedule["rows"]) - 1)],
+            ["Each day", often + (f": {', '.join(times)}" if times else "")],
+            ["In all", f"{schedule['days']} days, {len(schedule['rows']) - 1} adjustments"],
         ],
         "struts": strut_summary(document),
         "start": list(printed_values(document)[0]),

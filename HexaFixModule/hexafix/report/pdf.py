@@ -58,6 +58,16 @@ def _figure_content(document: Mapping[str, Any]) -> dict[str, Any]:
     return {"roses": roses, "curves": curves}
 
 
+def _warnings(document: Mapping[str, Any]) -> list[str]:
+    """What the reader of the image and the search for balls want the surgeon to see."""
+    balls = (
+        f"Ball {ball['number']}: {warning}"
+        for ball in document["balls"]
+        for warning in ball.get("warnings") or ()
+    )
+    return [*(document["image"].get("warnings") or ()), *balls]
+
+
 def prescription_content(
     document: Mapping[str, Any], *, pictures: ScenePictures | None = None
 ) -> dict[str, Any]:
@@ -81,7 +91,7 @@ def prescription_content(
         "tables": {name: table and table.as_strings() for name, table in tables.items()},
         "pictures": _picture_content(scene, pictures),
         "figures": _figure_content(plan),
-        "warnings": list(document["image"].get("warnings") or ()),
+        "warnings": _warnings(document),
         "conventions": words.FRAME_CONVENTIONS,
     }
 

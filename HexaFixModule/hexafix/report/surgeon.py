@@ -11,7 +11,7 @@ from typing import Any
 from hexafix.report import patient
 from hexafix.report.format import format_deg, format_measure, format_mm, format_number
 
-REJECTED_SHOWN = 10
+REJECTED_SHOWN = 6
 """Rejected candidates printed; the rest stand in plan.json."""
 
 RINGS = ("proximal", "distal")
@@ -166,6 +166,31 @@ def correction_table(document: Mapping[str, Any]) -> Table:
     return Table("Correction: {A} in {B}", POSE_HEAD, rows, note)
 
 
+DEFORMITY = (
+    ("ap_angulation", "AP angulation", "°"),
+    ("lateral_angulation", "lateral angulation", "°"),
+    ("axial_rotation", "axial rotation", "°"),
+    ("ap_translation", "AP translation", "mm"),
+    ("lateral_translation", "lateral translation", "mm"),
+    ("axial_translation", "axial translation", "mm"),
+)
+"""The six clinical parameters: key without unit, words, unit."""
+
+
+def deformity_table(document: Mapping[str, Any]) -> Table | None:
+    """The six clinical parameters as the case gives them."""
+    asked = document["case"].get("correction") or {}
+    if asked.get("kind") != "deformity":
+        return None
+    rows = []
+    for key, name, unit in DEFORMITY:
+        value = asked.get(f"{key}_{'mm' if unit == 'mm' else 'deg'}") or 0.0
+        rows.append((name, format_measure(value), unit, asked.get(key) or "-"))
+    origin = ", ".join(format_mm(x) for x in asked["origin_lps_mm"])
+    note = f"Of the {asked.get('moving', 'distal')} fragment, at the origin L, P, S = {origin} mm."
+    return Table("Deformity to correct", ("parameter", "size", "unit", "sense"), tuple(rows), note)
+
+
 def motion_table(document: Mapping[str, Any]) -> Table | None:
     """The rigid motion of the moving fragment in the image frame."""
     motion = document["correction"].get("fragment_motion_lps")
@@ -200,6 +225,9 @@ def rate_table(document: Mapping[str, Any]) -> Table:
     ]
     for key, name, unit in (
         ("realised_max_mm_per_day", "fastest day after rounding", "mm/day"),
+        ("realised_max_deg_per_day", "fastest day after rounding", "°/day"),
+        ("rounding_max_mm", "largest rounding error of a row", "mm"),
+        ("rounding_max_deg", "largest rounding error of a row", "°"),
         ("end_error_mm", "expected end error after rounding", "mm"),
         ("end_error_deg", "expected end error after rounding", "°"),
         ("condition_number_max", "largest condition number", "-"),
@@ -304,7 +332,7 @@ def version_table(document: Mapping[str, Any]) -> Table:
     fixator = document["case"]["fixator"]
     rows = [
         ("HexaFix", document["hexafix_version"]),
-        *((name, str(value)) for name, value in sorted(document["versions"].items())),
+        ("with", ", ".join(f"{k} {v}" for k, v in sorted(document["versions"].items()))),
         ("image", f"{image['kind']}, {size} voxels of {spacing} mm"),
         ("fixator", f"{fixator['id']}: {fixator['name']}"),
         ("source of its geometry", fixator.get("source") or "-"),
@@ -319,6 +347,7 @@ def surgeon_tables(document: Mapping[str, Any]) -> dict[str, Table | None]:
         "rings": ring_table(document),
         "mechanism": mechanism_table(document),
         "witness": strut_witness_table(document),
+        "deformity": deformity_table(document),
         "correction": correction_table(document),
         "motion": motion_table(document),
         "rates": rate_table(document),
