@@ -133,7 +133,7 @@ class SceneRenderer:
             environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
         try:
             return subprocess.Popen(
-                [sys.executable, "-I", str(CHILD_SCRIPT)],
+                [sys.executable, "-P", str(CHILD_SCRIPT)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
