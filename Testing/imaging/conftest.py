@@ -8,6 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import SimpleITK as sitk  # noqa: N813
+from hexafix.errors import ImageRefused
+from hexafix.imaging import itk_file
+from hexafix.imaging.itk_reader import load_with_itk
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import (
     DeflatedExplicitVRLittleEndian,
@@ -204,6 +208,35 @@ def assert_coded() -> Callable[..., None]:
                     assert value == code_of(i, j, k) + offset
 
     return check
+
+
+@pytest.fixture
+def coded_image() -> Callable[..., sitk.Image]:
+    """An ITK image in which every voxel's value tells which voxel it is, HU from -1024."""
+
+    def build(grid: Grid, direction=None, dtype=np.int16) -> sitk.Image:
+        k, j, i = np.meshgrid(*(np.arange(n) for n in grid.size[::-1]), indexing="ij")
+        image = sitk.GetImageFromArray((1000 * k + 10 * j + i + INTERCEPT).astype(dtype))
+        frame = np.column_stack([grid.row, grid.column, np.cross(grid.row, grid.column)])
+        image.SetDirection((frame if direction is None else direction).ravel())
+        image.SetOrigin(grid.origin)
+        image.SetSpacing((grid.between_columns, grid.between_rows, grid.step))
+        return image
+
+    return build
+
+
+@pytest.fixture
+def itk_in_process(monkeypatch) -> None:
+    """Saves the start of a child process for each of very many small files."""
+
+    def load(path, reader, geometry):
+        try:
+            return load_with_itk(path, reader)
+        except RuntimeError as error:
+            raise ImageRefused.of("corrupt-pixel-data", "unreadable", hazard="H09") from error
+
+    monkeypatch.setattr(itk_file, "load_isolated", load)
 
 
 @pytest.fixture(scope="session")

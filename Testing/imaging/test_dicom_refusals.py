@@ -205,9 +205,14 @@ def test_truncated_pixels_are_refused_before_decoding(cut, tmp_path, writer, gri
     assert f"403.75): {84 - cut} of 84 bytes" in fault.value
 
 
-def test_pixels_shorter_than_rows_times_columns_are_refused(tmp_path, writer, grid):
+@pytest.mark.parametrize("change", [-4, 4])
+def test_pixels_of_another_length_than_rows_times_columns_are_refused(
+    change, tmp_path, writer, grid
+):
     items = writer.slices(grid)
-    items[1].PixelData = items[1].PixelData[:-4]
+    items[1].PixelData = (items[1].PixelData + b"\0" * 4)[: 84 + change]
+    # What follows the pixels must not be taken for pixels.
+    items[1].add_new(0xFFFCFFFC, "OB", b"\0" * 20)
     only(faults_of(writer.save(tmp_path, items)), "truncated-pixel-data", "H09")
 
 

@@ -10,23 +10,15 @@ import pytest
 import SimpleITK as sitk  # noqa: N813
 from hexafix.errors import ImageRefused, InputError
 from hexafix.imaging import itk_file, read_volume
+from hexafix.imaging.itk_reader import load_with_itk
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+pytestmark = pytest.mark.usefixtures("itk_in_process")
+
 SUFFIXES = ["nrrd", "nhdr", "nii", "nii.gz", "mha", "mhd"]
 TILT = Rotation.from_euler("xyz", [0.3, -0.2, 0.5]).as_matrix()
-
-
-def coded_image(grid, direction=None, dtype=np.int16):
-    """Every voxel's value tells which voxel it is, HU from -1024."""
-    k, j, i = np.meshgrid(*(np.arange(n) for n in grid.size[::-1]), indexing="ij")
-    image = sitk.GetImageFromArray((1000 * k + 10 * j + i - 1024).astype(dtype))
-    frame = np.column_stack([grid.row, grid.column, np.cross(grid.row, grid.column)])
-    image.SetDirection((frame if direction is None else direction).ravel())
-    image.SetOrigin(grid.origin)
-    image.SetSpacing((grid.between_columns, grid.between_rows, grid.step))
-    return image
 
 
 def codes(path, error=ImageRefused):
@@ -41,7 +33,7 @@ def oblique(writer):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_format_keeps_value_and_place(suffix, tmp_path, oblique, assert_coded):
+def test_every_format_keeps_value_and_place(suffix, tmp_path, oblique, assert_coded, coded_image):
     path = tmp_path / f"image.{suffix}"
     sitk.WriteImage(coded_image(oblique), str(path), useCompression=suffix == "nrrd")
     volume = read_volume(path)
@@ -59,7 +51,7 @@ def test_every_format_keeps_value_and_place(suffix, tmp_path, oblique, assert_co
 
 
 @pytest.mark.parametrize("suffix", ["nrrd", "nii", "mha"])
-def test_a_left_handed_file_keeps_its_sign(suffix, tmp_path, writer):
+def test_a_left_handed_file_keeps_its_sign(suffix, tmp_path, writer, coded_image):
     grid = writer.grid()
     direction = np.diag([1.0, 1.0, -1.0])
     path = tmp_path / f"image.{suffix}"
@@ -96,7 +88,7 @@ def test_any_grid_survives_any_format(turn, mirrored, spacing, origin, suffix, t
         )
 
 
-def test_the_hash_is_that_of_the_image_however_it_was_stored(tmp_path, writer, grid):
+def test_the_hash_is_that_of_the_image_however_it_was_stored(tmp_path, writer, grid, coded_image):
     dicom = read_volume(writer.save(tmp_path / "dicom", writer.slices(grid))).source.sha256
     for suffix in SUFFIXES:
         path = tmp_path / f"image.{suffix}"
@@ -106,7 +98,9 @@ def test_the_hash_is_that_of_the_image_however_it_was_stored(tmp_path, writer, g
     assert read_volume(tmp_path / "float.nrrd").source.sha256 == dicom
 
 
-def test_the_hash_differs_for_one_voxel_and_for_one_hundredth_of_a_millimetre(tmp_path, grid):
+def test_the_hash_differs_for_one_voxel_and_for_one_hundredth_of_a_millimetre(
+    tmp_path, grid, coded_image
+):
     image = coded_image(grid)
     hashes = set()
     for name in ("same", "voxel", "place", "spacing"):
@@ -202,12 +196,12 @@ def test_a_link_inside_the_folder_does_not_lead_out_of_it(tmp_path):
 
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("suffix", ["nrrd", "nii", "mha", "nii.gz"])
-def test_truncated_files_are_refused(suffix, packed, tmp_path, grid):
+def test_truncated_files_are_refused(suffix, packed, tmp_path, grid, coded_image):
     path = tmp_path / f"image.{suffix}"
     sitk.WriteImage(coded_image(grid), str(path), useCompression=packed)
     path.write_bytes(path.read_bytes()[:-20])
     own = suffix == "nii.gz" or (suffix == "mha" and packed)
-    expected = {"corrupt-image-file", "truncated-pixel-data", "bad-nifti", "bad-metaimage"}
+    expected = {"corrupt-pixel-data", "truncated-pixel-data", "bad-nifti", "bad-metaimage"}
     assert set(codes(path, InputError if own else ImageRefused)) <= expected
 
 
@@ -220,10 +214,10 @@ def test_one_changed_byte_in_packed_voxels_is_noticed(suffix, tmp_path):
     data[-1000] ^= 0x40
     path.write_bytes(data)
     error = ImageRefused if suffix == "nrrd" else InputError
-    assert set(codes(path, error)) <= {"corrupt-image-file", "bad-nifti", "bad-metaimage"}
+    assert set(codes(path, error)) <= {"corrupt-pixel-data", "bad-nifti", "bad-metaimage"}
 
 
-def test_a_short_nifti_inside_a_whole_archive_is_refused(tmp_path, grid):
+def test_a_short_nifti_inside_a_whole_archive_is_refused(tmp_path, grid, coded_image):
     path = tmp_path / "image.nii"
     sitk.WriteImage(coded_image(grid), str(path))
     packed = tmp_path / "image.nii.gz"
@@ -287,7 +281,7 @@ def edit(path, offset, layout, *values):
 
 
 @pytest.fixture
-def nifti(tmp_path, oblique):
+def nifti(tmp_path, oblique, coded_image):
     path = tmp_path / "image.nii"
     sitk.WriteImage(coded_image(oblique), str(path))
     return path
@@ -347,33 +341,51 @@ def test_nifti_of_several_volumes_is_an_input_error(nifti):
     assert codes(nifti, InputError) == {"not-a-volume": None}
 
 
-def test_a_reader_that_warns_is_refused(tmp_path, monkeypatch):
+def test_a_warning_of_itk_is_heard(tmp_path, monkeypatch):
     path = nrrd(tmp_path / "a.nrrd")
     execute = sitk.ImageFileReader.Execute
+    assert load_with_itk(path, "NrrdImageIO")[0]["warnings"] == 0
 
     def warn(self, *args):
-        before = sitk.LoggerBase.GetGlobalITKLogger()
-        before.DisplayWarningText("WARNING: geometry was changed")
+        sitk.LoggerBase.GetGlobalITKLogger().DisplayWarningText("WARNING: geometry was changed")
         return execute(self, *args)
 
     monkeypatch.setattr(sitk.ImageFileReader, "Execute", warn)
-    assert codes(path) == {"reader-warning": "H53"}
+    assert load_with_itk(path, "NrrdImageIO")[0]["warnings"] == 1
+
+
+def test_a_real_doubt_of_itk_is_heard(nifti):
+    # Forms that disagree are refused by our own parser before ITK is asked: ask it directly.
+    (xy,) = struct.unpack_from("<f", nifti.read_bytes(), 284)
+    edit(nifti, 284, "<f", xy + 0.05)
+    about, _ = load_with_itk(nifti, "NiftiImageIO")
+    assert about["warnings"] > 0
+
+
+def test_a_reader_that_warns_is_refused(tmp_path, monkeypatch):
+    load = itk_file.load_isolated
+
+    def warned(*args):
+        about, array = load(*args)
+        return about | {"warnings": 1}, array
+
+    monkeypatch.setattr(itk_file, "load_isolated", warned)
+    assert codes(nrrd(tmp_path / "a.nrrd")) == {"reader-warning": "H53"}
 
 
 def test_two_readers_that_disagree_are_refused(tmp_path, monkeypatch):
-    path = nrrd(tmp_path / "a.nrrd")
-    load = itk_file.load_with_itk
+    load = itk_file.load_isolated
 
     def moved(*args):
-        array, affine = load(*args)
-        affine[2, 2] *= -1
-        return array, affine
+        about, array = load(*args)
+        about["affine"][2][2] *= -1
+        return about, array
 
-    monkeypatch.setattr(itk_file, "load_with_itk", moved)
-    assert codes(path) == {"readers-disagree": "H08"}
+    monkeypatch.setattr(itk_file, "load_isolated", moved)
+    assert codes(nrrd(tmp_path / "a.nrrd")) == {"readers-disagree": "H08"}
 
 
-def test_float_values_stay_float_where_they_are_not_whole(tmp_path, grid):
+def test_float_values_stay_float_where_they_are_not_whole(tmp_path, grid, coded_image):
     image = sitk.Cast(coded_image(grid), sitk.sitkFloat64) + 0.5
     sitk.WriteImage(image, str(tmp_path / "a.nrrd"))
     volume = read_volume(tmp_path / "a.nrrd")
@@ -381,7 +393,7 @@ def test_float_values_stay_float_where_they_are_not_whole(tmp_path, grid):
     assert volume.voxels[0, 0, 0] == -1023.5
 
 
-def test_values_that_are_no_numbers_are_refused(tmp_path, grid):
+def test_values_that_are_no_numbers_are_refused(tmp_path, grid, coded_image):
     image = coded_image(grid, dtype=np.float32)
     image[2, 2, 2] = float("nan")
     sitk.WriteImage(image, str(tmp_path / "a.nrrd"))

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import NDArray
 from pydicom import dcmread
 from pydicom.pixels.decoders.base import get_decoder
 from pydicom.pixels.utils import pixel_array
 from pydicom.uid import UID
 
-from hexafix.errors import Fault, ImageRefused, MissingLibrary
-from hexafix.imaging.dicom_header import DEFLATED, PLAIN_SYNTAXES
+from hexafix.errors import Fault, MissingLibrary
+from hexafix.imaging.dicom_header import DEFLATED, PLAIN_SYNTAXES, SliceHeader
+from hexafix.imaging.isolation import run_isolated
 
 # Transfer syntaxes that always lose something; J2K and JPEG XL tell it in LossyImageCompression.
 LOSSY_SYNTAXES = frozenset(
     "1.2.840.10008.1.2.4." + tail for tail in ("50", "51", "52", "53", "54", "55", "56", "81")
 )
+
+# The child's limits: Python and the codecs, then a whole file inflated and its frame in all stages.
+_BASE_MEMORY = 2 << 30
+_BYTES_PER_PIXEL = 32
+_BASE_SECONDS = 60.0
+_SECONDS_PER_SLICE = 2.0
 
 
 def require_decoder(transfer_syntax: str) -> list[Fault]:
@@ -53,25 +61,37 @@ def require_decoder(transfer_syntax: str) -> list[Fault]:
     return []
 
 
-def decode_frame(path: Path, frame: int, transfer_syntax: str) -> NDArray:
-    """Stored pixel values of one frame, shape (J, I), before rescale; always a fresh array.
+def decode_frames(slices: Sequence[SliceHeader]) -> Generator[NDArray]:
+    """Stored pixel values of compressed slices, shape (J, I) each, decoded in a child process.
+
+    Close the iterator when it is left early.
 
     Raises
     ------
     ImageRefused
-        If the decoder fails on the pixels.
+        If a decoder fails or the child dies.
     """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            # pydicom finds the pixels by file position, which a deflated file does not have.
-            source = dcmread(path) if transfer_syntax == DEFLATED else path
-            return np.array(pixel_array(source, index=frame, raw=True))
-    except Exception as error:  # any codec failure means the same to the user
-        raise ImageRefused.of(
-            "corrupt-pixel-data",
-            "the compressed pixels of a slice cannot be decoded",
-            value=type(error).__name__,
-            next_step="export the series again, uncompressed if possible",
-            hazard="H09",
-        ) from error
+    if not slices:
+        return
+    largest = max(item.rows * item.columns * item.frames for item in slices)
+    results = run_isolated(
+        "decode",
+        [(str(item.path.resolve()), item.frame, item.pixels.transfer_syntax) for item in slices],
+        memory_bytes=_BASE_MEMORY + largest * _BYTES_PER_PIXEL,
+        seconds=_BASE_SECONDS + len(slices) * _SECONDS_PER_SLICE,
+    )
+    with closing(results):
+        for _, stored in results:
+            yield stored
+
+
+def decode_frame(path: Path, frame: int, transfer_syntax: str) -> NDArray:
+    """Stored pixel values of one frame, shape (J, I), before rescale.
+
+    Runs in the child process: any exception, and any crash, means that the file is corrupt.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # pydicom finds the pixels by file position, which a deflated file does not have.
+        source = dcmread(path) if transfer_syntax == DEFLATED else path
+        return pixel_array(source, index=frame, raw=True)

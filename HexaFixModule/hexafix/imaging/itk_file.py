@@ -1,8 +1,9 @@
-"""NRRD, NIfTI and MetaImage: voxels by SimpleITK, geometry checked against our own parsers."""
+"""NRRD, NIfTI and MetaImage: voxels by SimpleITK, geometry by our own parsers, both compared."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hexafix.imaging.file_geometry import (
     faults_of_grid,
 )
 from hexafix.imaging.fingerprint import fingerprint
+from hexafix.imaging.isolation import run_isolated
 from hexafix.imaging.metaimage_header import read_metaimage_header
 from hexafix.imaging.nifti_header import read_nifti_header
 from hexafix.imaging.nrrd_header import read_nrrd_header
@@ -27,6 +29,12 @@ from hexafix.progress import Progress
 THICK_SLICES_MM = 2.0
 _AIR_SEEN_HU = -900
 _INT16 = np.iinfo(np.int16)
+
+# The child's limits: Python, NumPy and ITK themselves, then image and copy at eight bytes a voxel.
+_BASE_MEMORY = 2 << 30
+_LARGEST_VOXEL = 8
+_BASE_SECONDS = 60.0
+_VOXELS_PER_SECOND = 2e6
 
 _PARSERS: dict[str, tuple[str, str, Callable[[Path], FileGeometry]]] = {
     ".nrrd": ("nrrd", "NrrdImageIO", read_nrrd_header),
@@ -70,8 +78,9 @@ def read_itk_file(path: Path, progress: Progress) -> Volume:
             where=where,
             next_step="crop the CT around the fixator",
         )
-    array, itk_affine = load_with_itk(path, reader)
-    _refuse_other_geometry(geometry, array, itk_affine, kind)
+    about, array = load_isolated(path.resolve(), reader, geometry)
+    _refuse_doubts(about)
+    _refuse_other_geometry(geometry, array, np.array(about["affine"]), kind)
     progress("read image file", 0.5)
     voxels = _hounsfield(array)
     source = ImageSource(
@@ -83,66 +92,37 @@ def read_itk_file(path: Path, progress: Progress) -> Volume:
     return Volume(voxels, geometry.ijk_to_lps, source)
 
 
-def load_with_itk(path: Path, reader: str) -> tuple[NDArray, NDArray[np.float64]]:
-    """Voxels, shape (K, J, I), and voxel-to-LPS affine as SimpleITK sees them.
+def load_isolated(
+    path: Path, reader: str, geometry: FileGeometry
+) -> tuple[dict[str, Any], NDArray]:
+    """What `itk_reader.load_with_itk` returns, read in a child process."""
+    size = int(np.prod(geometry.size_ijk))
+    memory = _BASE_MEMORY + 2 * size * _LARGEST_VOXEL
+    seconds = _BASE_SECONDS + size / _VOXELS_PER_SECOND
+    results = run_isolated("itk", [str(path), reader], memory_bytes=memory, seconds=seconds)
+    with closing(results):
+        return next(results)
 
-    The one place where ITK sees a foreign file.
 
-    Raises
-    ------
-    ImageRefused
-        If ITK fails or warns: its warnings are about geometry that it changed (H53).
-    """
-    import SimpleITK as sitk  # noqa: N813  slow to import, and only these formats need it
-
-    heard: list[str] = []
-
-    class Listener(sitk.LoggerBase):
-        def DisplayText(self, t: str) -> None:  # noqa: N802
-            heard.append(t)
-
-        DisplayErrorText = DisplayWarningText = DisplayText
-        DisplayGenericOutputText = DisplayDebugText = DisplayText
-
-    listener = Listener()
-    before: Any = listener.SetAsGlobalITKLogger()
-    try:
-        source = sitk.ImageFileReader()
-        source.SetImageIO(reader)
-        source.SetFileName(str(path))
-        image = source.Execute()
-    except RuntimeError as error:
-        # ITK's text holds the whole path; only the kind of trouble goes out.
-        raise ImageRefused.of(
-            "corrupt-image-file",
-            "SimpleITK cannot read the image file",
-            next_step="store the image again",
-            hazard="H09",
-        ) from error
-    finally:
-        before.SetAsGlobalITKLogger()
-    if heard:
+def _refuse_doubts(about: dict[str, Any]) -> None:
+    """Refuse what ITK warned about: its warnings are about geometry that it changed (H53)."""
+    if about["warnings"]:
         raise ImageRefused.of(
             "reader-warning",
             "the reader was in doubt about the image file",
-            value=f"{len(heard)} warnings",
+            value=f"{about['warnings']} warnings",
             limit="0",
             next_step="convert the CT again from DICOM",
             hazard="H53",
         )
-    if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
+    if about["dimension"] != 3 or about["components"] != 1:
         raise InputError.of(
             "not-a-volume",
             "the image is not one three-dimensional grey-value volume",
-            value=f"{image.GetDimension()} dimensions, "
-            f"{image.GetNumberOfComponentsPerPixel()} components",
+            value=f"{about['dimension']} dimensions, {about['components']} components",
             limit="3 dimensions, 1 component",
             next_step="store one three-dimensional CT volume",
         )
-    affine = np.eye(4)
-    affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * np.array(image.GetSpacing())
-    affine[:3, 3] = image.GetOrigin()
-    return sitk.GetArrayFromImage(image), affine
 
 
 def _refuse_other_geometry(

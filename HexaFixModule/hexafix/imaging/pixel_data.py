@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.errors import Fault, ImageRefused, InputError
-from hexafix.imaging.decoding import decode_frame, require_decoder
+from hexafix.imaging.decoding import decode_frames, require_decoder
 from hexafix.imaging.dicom_header import DEFLATED, EXPLICIT_BIG, PLAIN_SYNTAXES, SliceHeader
 from hexafix.imaging.fingerprint import THREADS, hash_slice
 from hexafix.imaging.hounsfield import NeedsFloat, convert, stored_type
@@ -20,6 +22,8 @@ from hexafix.progress import Progress
 # Far above any CT of a limb (1024 x 1024 x 1500), far below what would exhaust a workstation.
 MAX_VOXELS = 1_600_000_000
 _BATCH = 8
+_CHILD_BATCH = 16
+_POLL_SECONDS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,27 +121,45 @@ def read_pixels(stack: SliceStack, progress: Progress) -> Pixels:
 def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) -> Pixels:
     hashes: list[bytes] = [b""] * len(slices)
     lowest = [0.0] * len(slices)
+    stop = Event()
+    # A child process that decodes should serve many slices; plain reading is best in small turns.
+    plain = all(item.pixels.transfer_syntax in PLAIN_SYNTAXES for item in slices)
+    batch = _BATCH if plain else max(-(-len(slices) // THREADS), _CHILD_BATCH)
 
     def fill(start: int) -> None:
-        for k in range(start, min(start + _BATCH, len(slices))):
-            read_slice(slices[k], voxels[k])
-            hashes[k] = hash_slice(voxels[k])
-            lowest[k] = float(voxels[k].min())
+        end = min(start + batch, len(slices))
+        with closing(read_slices(slices[start:end], voxels[start:end])) as done:
+            for k in range(start, end):
+                if stop.is_set():
+                    return
+                next(done)
+                lowest[k] = float(voxels[k].min())
+                hashes[k] = hash_slice(voxels[k])
 
     with ThreadPoolExecutor(THREADS) as pool:
-        futures = [pool.submit(fill, start) for start in range(0, len(slices), _BATCH)]
+        futures = [pool.submit(fill, start) for start in range(0, len(slices), batch)]
         try:
-            for done, future in enumerate(as_completed(futures)):
-                future.result()
-                progress("read CT slices", (done + 1) / len(futures))
-        except BaseException:
+            pending = set(futures)
+            while pending:
+                finished, pending = wait(pending, timeout=_POLL_SECONDS)
+                for future in finished:
+                    future.result()
+                progress("read CT slices", sum(map(bool, hashes)) / len(slices))
+        finally:
+            stop.set()
             pool.shutdown(cancel_futures=True)
-            raise
     return Pixels(voxels, hashes, min(lowest))
 
 
-def read_slice(item: SliceHeader, out: NDArray) -> None:
-    """Write the Hounsfield units of one slice into `out`, shape (J, I), int16 or float32.
+def read_slices(slices: Sequence[SliceHeader], out: Sequence[NDArray] | NDArray) -> Generator[None]:
+    """Write the Hounsfield units of each slice into its part of `out`, one a step.
+
+    Close the iterator when it is left early.
+
+    Parameters
+    ----------
+    slices : sequence of SliceHeader
+    out : sequence of ndarray, shape (J, I) each, int16 or float32
 
     Raises
     ------
@@ -146,13 +168,21 @@ def read_slice(item: SliceHeader, out: NDArray) -> None:
     NeedsFloat
         If `out` is int16 and would lose something.
     """
+    packed = [item for item in slices if item.pixels.transfer_syntax not in PLAIN_SYNTAXES]
+    with closing(decode_frames(packed)) as decoded:
+        for item, target in zip(slices, out, strict=True):
+            if item.pixels.transfer_syntax in PLAIN_SYNTAXES:
+                _read_plain(item, target)
+            else:
+                stored = next(decoded, None)
+                if stored is None or stored.shape != target.shape:
+                    raise _unreadable("decoded size differs from the header")
+                convert(stored, item, target)
+            yield
+
+
+def _read_plain(item: SliceHeader, out: NDArray) -> None:
     pixels = item.pixels
-    if pixels.transfer_syntax not in PLAIN_SYNTAXES:
-        stored = decode_frame(item.path, item.frame, pixels.transfer_syntax)
-        if stored.shape != out.shape:
-            raise _unreadable("decoded size differs from the header")
-        convert(stored, item, out)
-        return
     kind = stored_type(item, big_endian=pixels.transfer_syntax == EXPLICIT_BIG)
     direct = kind.itemsize == out.dtype.itemsize == 2 and kind.isnative
     stored = out.view(kind) if direct else np.empty(out.shape, kind)
@@ -182,9 +212,15 @@ def faults_of_doubles(stack: SliceStack) -> list[Fault]:
     Identical pixels are the same slice twice and no fault; the stack holds it once.
     """
     different = []
-    for index, double in stack.doubled:
-        kept = stack.slices[index]
-        if not _same_place(kept, double) or not np.array_equal(_read(kept), _read(double)):
+    pairs = [(stack.slices[index], double) for index, double in stack.doubled]
+    flat = [item for pair in pairs for item in pair]
+    values = [np.empty((item.rows, item.columns), np.float32) for item in flat]
+    with closing(read_slices(flat, values)) as done:
+        for _ in done:
+            pass
+    for number, (index, _) in enumerate(stack.doubled):
+        kept, double = values[2 * number : 2 * number + 2]
+        if not _same_place(*pairs[number]) or not np.array_equal(kept, double):
             different.append(f"{stack.origins_mm[index] @ stack.axes[2]:.3f}")
     if not different:
         return []
@@ -197,12 +233,6 @@ def faults_of_doubles(stack: SliceStack) -> list[Fault]:
         hazard="H04",
     )
     return [fault]
-
-
-def _read(item: SliceHeader) -> NDArray[np.float32]:
-    out = np.empty((item.rows, item.columns), np.float32)
-    read_slice(item, out)
-    return out
 
 
 def _same_place(kept: SliceHeader, double: SliceHeader) -> bool:
