@@ -163,7 +163,7 @@ def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -
     if rays.clipped_share > CLIPPED_SHARE:
         warnings.append(
             f"{rays.clipped_share:.0%} of the ball's core is clipped (limit {CLIPPED_SHARE:.0%}): "
-            "fitted by its edges, its diameter looks too large (H11)"
+            "fitted by its edges, its diameter may look too large (H11)"
         )
     if model is not None:
         apart = float(np.linalg.norm(model.center_mm - rays.center_mm))

@@ -21,7 +21,7 @@ CLIPPED_GROWTH_MM = 0.75
 """How much larger a ball looks when its voxels are clipped."""
 CLIPPED_CORE = 0.02
 """Share of clipped voxels in the core from which a ball counts as clipped."""
-ROUGHNESS_MM = 0.10
+ROUGHNESS_MM = 0.135
 """RMS distance of the edges from the sphere, at voxels up to 1 mm."""
 EDGE_SHARE = 0.80
 """Share of the directions left that have a sound edge on the sphere."""
@@ -29,6 +29,10 @@ CUT_SHARE = 0.60
 """Share of directions hidden by metal beyond which a ball is not judged."""
 HOMOGENEITY = 0.12
 """RMS of the model's residual over the contrast."""
+STEM_SHELLS_MM = (0.9, 2.0, 3.5)
+"""Where a metal stem is looked for, beyond the ball's radius."""
+STEM_SHARE, STEM_GROWTH = 0.8, 0.08
+"""A stem is thinner than this share of the ball and widens by less than that between shells."""
 CORE_SHARE = 0.22
 """Difference of the core's HU from the others', over their contrast."""
 
@@ -95,7 +99,8 @@ def model_failures(model: ModelFit | None, rays: RayFit) -> Iterator[str]:
     """Reasons of the blurred-ball model."""
     contrast = rays.core_hu - rays.outside_hu
     if model is None:
-        yield "model: the blurred ball does not fit"
+        if rays.clipped_share <= CLIPPED_CORE:
+            yield "model: the blurred ball does not fit"
         return
     noise = rays.core_noise_hu
     limit = HOMOGENEITY * contrast + 1.5 * noise
@@ -106,21 +111,24 @@ def model_failures(model: ModelFit | None, rays: RayFit) -> Iterator[str]:
 def stem_failures(crop: Crop, rays: RayFit, radius_mm: float) -> Iterator[str]:
     """Reason when a metal stem grows out of the ball, as on a strut's ball joint.
 
-    A marker's own rod is far less dense than the ball; a ring or a neighbouring ball is wider.
+    A marker's own rod is far less dense than the ball; a ring is wider, a neighbouring ball grows
+    wider from shell to shell, and neither fills the gap to the ball.
     """
     directions = sphere_directions(DIRECTIONS)
     half = rays.outside_hu + 0.5 * (rays.core_hu - rays.outside_hu)
     if rays.shell_hu.max() < half:
         return
-    width, axes = 0.0, []
-    for distance in (radius_mm + 2.0, radius_mm + 3.5):
+    dense, widths = [], []
+    for distance in radius_mm + np.array(STEM_SHELLS_MM):
         values = crop.sample(rays.center_mm + distance * directions, order=1)
-        patch = directions[neighbour_average(DIRECTIONS, 0.08) @ values > half]
-        if len(patch) < 2:
-            return
-        axes.append(patch.sum(axis=0) / np.linalg.norm(patch.sum(axis=0)))
-        cosine = float(np.min(patch @ axes[-1]))
-        width = max(width, distance * np.sqrt(1.0 - min(cosine, 1.0) ** 2) if cosine > 0.3 else 1e9)
-    limit = 0.8 * radius_mm
-    if width < limit and axes[0] @ axes[1] > 0.95:
-        yield f"rod: a stem as dense as the ball, {width:.1f} mm in radius, limit {limit:.1f} mm"
+        dense.append(neighbour_average(DIRECTIONS, 0.08) @ values > half)
+        widths.append(distance * np.sin(np.arccos(1.0 - 2.0 * min(0.5, dense[-1].mean()))))
+    at_ball, near, far = dense
+    if near.sum() < 4 or far.sum() < 3 or at_ball[near].mean() < 0.8:
+        return
+    axis = directions[near].sum(axis=0) / np.linalg.norm(directions[near].sum(axis=0))
+    reach = float(np.arccos(np.clip(np.min(directions[near | far] @ axis), -1.0, 1.0)))
+    limit = STEM_SHARE * radius_mm
+    compact = reach < 1.5 * np.arcsin(min(1.0, limit / (radius_mm + STEM_SHELLS_MM[1])))
+    if compact and widths[1] < limit and widths[2] - widths[1] < STEM_GROWTH * radius_mm:
+        yield f"rod: a stem as dense as the ball, radius {widths[1]:.1f} mm, limit {limit:.1f} mm"

@@ -25,8 +25,8 @@ DARK_SHARE = 0.62
 ROUNDS = ((24, 1.0, 0.9, 0.35), (48, 0.625, 0.50, 0.50), (64, 0.625, 0.35, 0.65))
 """Rounds of rays: how many, pitch along them in mm for a radius of 5 mm, share of the radius by
 which a crossing may miss, least share of rays that hit."""
-ON_SPHERE = 0.10
-"""A hit lies this share of the radius from the fitted sphere."""
+ON_SPHERE = 0.06, 0.30
+"""A hit lies this share of the radius and of the thickest voxel from the fitted sphere."""
 CHUNK = 16_384
 """Places polled at a time; bounds the memory."""
 
@@ -172,13 +172,14 @@ def _ray_round(
     inverse = np.linalg.inv(volume.ijk_to_lps[:3, :3])
     directions = sphere_directions(rays)
     jumps = np.rint((distance[:, None, None] * directions) @ inverse.T).astype(np.int64)
+    tolerance = ON_SPHERE[0] * radius + ON_SPHERE[1] * float(volume.spacing_mm.max())
     moved, radii, hits = [np.empty((0, 3))], [np.empty(0)], [np.empty(0)]
     for start in range(0, len(centers), 128):
         near = np.rint(centers[start : start + 128]).astype(np.int64)
         profile = _profiles(volume, near, jumps)
         reach, crossed = _half_height(profile, distance, radius)
         crossed &= np.abs(reach - radius) < slack * radius
-        shift, size, hit = _sphere_shift(reach[..., None] * directions, crossed)
+        shift, size, hit = _sphere_shift(reach[..., None] * directions, crossed, tolerance)
         moved.append(near + shift @ inverse.T)
         radii.append(size)
         hits.append(hit)
@@ -217,7 +218,7 @@ def _half_height(
 
 
 def _sphere_shift(
-    edge: NDArray[np.float64], near: NDArray[np.bool_]
+    edge: NDArray[np.float64], near: NDArray[np.bool_], tolerance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Algebraic sphere centres, (M, 3), and radii of edge points, (M, n, 3); shares that hit."""
     rows = np.concatenate([edge, np.ones_like(edge[..., :1])], axis=-1)
@@ -230,7 +231,7 @@ def _sphere_shift(
         center = solution[:, :3]
         size = np.sqrt(np.maximum(2 * solution[:, 3] + np.sum(center**2, -1), 0.01))
         miss = np.abs(np.linalg.norm(edge - center[:, None], axis=-1) - size[:, None])
-        hit = near & (miss < ON_SPHERE * size[:, None])
+        hit = near & (miss < tolerance)
         weight = near * np.where(hit, 1.0, 0.1)
     return center, size, hit.mean(axis=1)
 
