@@ -8,7 +8,7 @@ from hexafix.errors import Cancelled, ImageRefused, InputError, MissingLibrary
 from hexafix.imaging import pixel_data, read_volume
 from pydicom.dataset import Dataset
 from pydicom.encaps import encapsulate
-from pydicom.uid import JPEG2000Lossless, RLELossless, generate_uid
+from pydicom.uid import JPEG2000Lossless, RLELossless
 
 
 def faults_of(folder, error=ImageRefused, **choice):
@@ -319,55 +319,6 @@ def test_work_stops_when_the_user_cancels(tmp_path, writer, grid):
     with pytest.raises(Cancelled):
         read_volume(folder, progress=stop)
     assert seen[0] == "read DICOM headers"
-
-
-def test_two_series_are_refused_with_their_properties(tmp_path, writer, grid, secret):
-    first, second = writer.slices(grid), writer.slices(writer.grid(size=(7, 6, 4), step=3.0))
-    second[0].SeriesDescription = secret
-    writer.save(tmp_path / "1", first)
-    writer.save(tmp_path / "2", second)
-    fault = only(faults_of(tmp_path), "several-series", "H05")
-    assert "5 slices of 7 x 6, 0.450 x 0.700 x 1.250 mm, axial" in fault.value
-    assert "4 slices of 7 x 6, 0.450 x 0.700 x 3.000 mm, axial" in fault.value
-    assert secret not in fault.message
-
-
-def test_the_series_asked_for_is_read_alone(tmp_path, writer, grid, assert_coded):
-    first, second = writer.slices(grid), writer.slices(writer.grid(size=(7, 6, 4), step=3.0))
-    writer.save(tmp_path / "1", first)
-    writer.save(tmp_path / "2", second)
-    volume = read_volume(tmp_path, series_instance_uid=first[0].SeriesInstanceUID)
-    assert_coded(volume, grid)
-    assert "left out (H05): 4 x other series" in volume.source.warnings
-
-
-def test_a_series_that_is_not_there_is_an_input_error(tmp_path, writer, grid):
-    folder = writer.save(tmp_path, writer.slices(grid))
-    assert "series-not-found" in faults_of(folder, InputError, series_instance_uid=generate_uid())
-
-
-@pytest.mark.parametrize("kind", ["localizer", "secondary capture"])
-@pytest.mark.parametrize("own_series", [False, True])
-def test_localizers_and_captures_are_left_out_with_their_reason(
-    kind, own_series, tmp_path, writer, grid, assert_coded
-):
-    items = writer.slices(grid)
-    uid = generate_uid() if own_series else items[0].SeriesInstanceUID
-    extra = writer.one(writer.grid(size=(9, 9, 5), row=(0, 1, 0), column=(0, 0, -1)), 0, uid)
-    if kind == "localizer":
-        extra.ImageType = ["ORIGINAL", "PRIMARY", "LOCALIZER"]
-    else:
-        extra.SOPClassUID = "1.2.840.10008.5.1.4.1.1.7"
-    volume = read_volume(writer.save(tmp_path, [*items, extra]))
-    assert_coded(volume, grid)
-    assert f"left out (H05): 1 x {kind}" in volume.source.warnings
-
-
-def test_a_folder_of_localizers_only_is_refused(tmp_path, writer, grid):
-    items = writer.slices(grid)
-    for item in items:
-        item.ImageType = ["ORIGINAL", "PRIMARY", "LOCALIZER"]
-    only(faults_of(writer.save(tmp_path, items)), "no-usable-series", "H05")
 
 
 def test_files_that_are_no_dicom_are_skipped_and_counted(tmp_path, writer, grid, assert_coded):
