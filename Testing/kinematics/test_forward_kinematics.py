@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hexafix.errors import ForwardKinematicsDiverged, InputError
 from hexafix.geometry import Pose
+from hexafix.hardware import Ring
 from hexafix.kinematics import (
     forward_kinematics,
     forward_kinematics_batch,
@@ -9,6 +12,7 @@ from hexafix.kinematics import (
     strut_lengths,
     strut_lengths_batch,
 )
+from hexafix.kinematics.newton import _rotation, _rotations, solve_rows
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
@@ -116,6 +120,37 @@ def test_a_step_from_an_exactly_singular_start_is_no_crash(fixator, neutral):
     np.testing.assert_allclose(
         strut_lengths(found.pose, fixator), strut_lengths(neutral, fixator), atol=1e-9
     )
+
+
+def test_a_singular_row_leaves_the_others_alone(fixator, neutral):
+    flat = np.zeros((6, 3))
+    line = replace(fixator, proximal=Ring(flat, 8.0, 110.0))
+    # all joints of the moving ring in one point: no turn moves a strut
+    point = Pose(np.eye(3), np.array([1.0, 2.0, 180.0]))
+    with pytest.raises(ForwardKinematicsDiverged, match=r"row 0 \(2 of 2 rows\)"):
+        forward_kinematics_batch(
+            [strut_lengths(point, line) + 1.0] * 2,
+            line,
+            start_rotations=np.eye(3),
+            start_positions=[0.0, 0.0, 185.0],
+        )
+    starts = np.array([np.eye(3), Pose.exp([0, 0, 0, 0, 0, np.pi / 2]).rotation])
+    lengths = np.tile(strut_lengths(neutral, fixator), (2, 1))
+    lengths[0] += [0.5, -0.5, 0.2, 0.1, -0.3, 0.4]
+    batch = solve_rows(
+        lengths, fixator, start_rotations=starts, start_positions=neutral.position_mm
+    )
+    assert batch.arrived[0]
+
+
+def test_the_cheap_rotation_of_a_step_is_proper_and_right_to_third_order():
+    for vector in np.random.default_rng(2).uniform(-0.05, 0.05, (20, 3)):
+        one = _rotation(*vector)
+        many = _rotations(*vector[:, None])[..., 0]
+        np.testing.assert_allclose(one, many, atol=1e-15)
+        np.testing.assert_allclose(one.T @ one, np.eye(3), atol=1e-15)
+        exact = Pose.exp([0, 0, 0, *vector]).rotation
+        assert np.abs(one - exact).max() < np.linalg.norm(vector) ** 3 / 6
 
 
 def test_second_starts_agree_over_the_working_space(fixator, random_poses):

@@ -7,7 +7,7 @@ a single solution would else go into the overhead of small arrays.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ MAX_ITERATIONS = 30
 STEP_LIMIT_MM, STEP_LIMIT_RAD = 60.0, 0.6
 """Longest Newton step; keeps a bad linearisation from leaping to another assembly mode."""
 
-_CHUNK = 512  # rows solved together, so that their arrays stay in the cache
+_CHUNK = 1024  # rows solved together, so that their arrays stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +136,13 @@ def solve_rows(
     p = np.array(np.broadcast_to(np.asarray(start_positions, float), (m, 3)).T)
     q = np.ascontiguousarray(lengths_mm.T)
     iterations, residual = np.zeros(m, np.int64), np.full(m, np.inf)
-    for first in range(0, m, _CHUNK):
-        rows = slice(first, min(first + _CHUNK, m))
-        _solve_chunk(
-            q[:, rows], fixator, r[..., rows], p[:, rows], iterations[rows], residual[rows]
-        )
+    # a singular row becomes NaN and fails by itself
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for first in range(0, m, _CHUNK):
+            rows = slice(first, min(first + _CHUNK, m))
+            _solve_chunk(
+                q[:, rows], fixator, r[..., rows], p[:, rows], iterations[rows], residual[rows]
+            )
     return ForwardBatch(
         np.ascontiguousarray(np.moveaxis(r, -1, 0)),
         np.ascontiguousarray(p.T),
@@ -161,41 +163,62 @@ def _solve_chunk(
     a, b = fixator.proximal.joints_mm, fixator.distal.joints_mm.T[:, :, None]
     active = np.arange(q.shape[1])
     r, p = rotations.copy(), positions.copy()
+    arms, columns = np.empty((3, 6, len(active))), np.empty((6, 6, len(active)))
     for iteration in range(MAX_ITERATIONS + 1):
         m = len(active)
-        # arms[i, l] = Σ_j r[i, j] a[l, j]
-        arms = np.stack([(a @ r[i].reshape(3, m)) for i in range(3)])
-        vectors = arms + (p[:, None, :] - b)
+        np.matmul(a, r, out=arms)  # arms[i, l] = Σ_j a[l, j] r[i, j]
+        vectors = p[:, None, :] - b
+        vectors += arms
         lengths = np.sqrt((vectors * vectors).sum(axis=0))
         missing = q - lengths
         worst = np.abs(missing).max(axis=0)
-        rotations[..., active], positions[:, active] = r, p
-        residual[active], iterations[active] = worst, iteration
         going = (worst > TOLERANCE_MM) & np.isfinite(worst)
-        if iteration == MAX_ITERATIONS or not going.any():
+        rotations[..., active], positions[:, active] = r, p
+        residual[active] = worst
+        iterations[active[going]] = min(iteration + 1, MAX_ITERATIONS)
+        count = int(going.sum())
+        if iteration == MAX_ITERATIONS or not count:
             return
-        if not going.all():
-            active, q, r, p = active[going], q[:, going], r[..., going], p[:, going]
-            arms, vectors = arms[..., going], vectors[..., going]
-            lengths, missing = lengths[:, going], missing[:, going]
-        columns = np.empty((6, 6, len(active)))
-        columns[:3] = vectors / lengths
+        np.divide(vectors, lengths, out=columns[:3])
         _moments(arms, columns[:3], out=columns[3:])
+        if 2 * count < m:  # a row that has arrived may take a step more, but not many
+            active, q, r, p = active[going], q[:, going], r[..., going], p[:, going]
+            missing, columns = missing[:, going], columns[..., going]
+            arms = np.empty((3, 6, count))
         step = _solve_systems(columns, missing)
         p = p + step[:3]
-        r = np.einsum("ijm,jkm->ikm", np.moveaxis(rotations_of(step[3:].T), 0, -1), r)
+        turn = _rotations(step[3], step[4], step[5])
+        # r[i, k] = Σ_j turn[i, j] r[j, k]
+        r = (
+            turn[:, 0, None] * r[None, 0]
+            + turn[:, 1, None] * r[None, 1]
+            + turn[:, 2, None] * r[None, 2]
+        )
 
 
 def _solve_systems(
     columns: NDArray[np.float64], missing: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Newton steps (6, m) of transposed Jacobians (6, 6, m), limited in length."""
-    jacobians = np.ascontiguousarray(columns.transpose(2, 1, 0))
-    right = np.ascontiguousarray(missing.T)[..., None]
-    try:
-        step = np.linalg.solve(jacobians, right)[..., 0].T
-    except np.linalg.LinAlgError:  # one singular row must not stop the others
-        step = (np.linalg.pinv(jacobians) @ right)[..., 0].T
+    """Newton steps (6, m) of transposed Jacobians (6, 6, m), limited in length.
+
+    Elimination of the normal equations, which need no pivots, for all rows at once. Their
+    squared condition number costs digits that the next step brings back.
+    """
+    m = missing.shape[1]
+    system = np.empty((6, 7, m))
+    right = system[:, 6]
+    for i in range(6):
+        products = columns[i:] * columns[i]
+        system[i, i:6] = products.sum(axis=1)
+    (columns * missing).sum(axis=1, out=right)
+    for k in range(5):
+        factors = system[k, k + 1 : 6] / system[k, k]
+        for i in range(k + 1, 6):
+            system[i, i:] -= factors[i - k - 1] * system[k, i:]
+    step = np.empty((6, m))
+    for k in range(5, -1, -1):
+        known = (system[k, k + 1 : 6] * step[k + 1 :]).sum(axis=0)
+        step[k] = (right[k] - known) / system[k, k]
     shift = np.sqrt((step[:3] ** 2).sum(axis=0))
     angle = np.sqrt((step[3:] ** 2).sum(axis=0))
     return step / np.maximum(np.maximum(shift / STEP_LIMIT_MM, angle / STEP_LIMIT_RAD), 1.0)
@@ -213,18 +236,36 @@ def _moments(
 
 
 def _rotation(u: float, v: float, w: float) -> NDArray[np.float64]:
-    """Rotation matrix of the rotation vector (u, v, w), radians."""
-    angle = sqrt(u * u + v * v + w * w)
-    s = sin(angle) / angle if angle > 1e-8 else 1.0
-    c = 2.0 * (sin(angle / 2) / angle) ** 2 if angle > 1e-8 else 0.5
-    k = cos(angle)
+    """Proper rotation that equals exp((u, v, w)×) to third order, shape (3, 3).
+
+    The Cayley map costs no sine and no cosine, and Newton does not see the difference.
+    """
+    u, v, w = 0.5 * u, 0.5 * v, 0.5 * w
+    c = 2.0 / (1.0 + u * u + v * v + w * w)
+    k = c - 1.0
     return np.array(
         (
-            (k + c * u * u, c * u * v - s * w, c * u * w + s * v),
-            (c * u * v + s * w, k + c * v * v, c * v * w - s * u),
-            (c * u * w - s * v, c * v * w + s * u, k + c * w * w),
+            (k + c * u * u, c * (u * v - w), c * (u * w + v)),
+            (c * (u * v + w), k + c * v * v, c * (v * w - u)),
+            (c * (u * w - v), c * (v * w + u), k + c * w * w),
         )
     )
+
+
+def _rotations(
+    u: NDArray[np.float64], v: NDArray[np.float64], w: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """`_rotation` of many vectors, each component of shape (M,); shape (3, 3, M)."""
+    u, v, w = 0.5 * u, 0.5 * v, 0.5 * w
+    c = 2.0 / (1.0 + u * u + v * v + w * w)
+    cu, cv, cw = c * u, c * v, c * w
+    out = np.empty((3, 3, len(u)))
+    k, uv, uw, vw = c - 1.0, cu * v, cu * w, cv * w
+    out[0, 0], out[1, 1], out[2, 2] = k + cu * u, k + cv * v, k + cw * w
+    out[0, 1], out[1, 0] = uv - cw, uv + cw
+    out[0, 2], out[2, 0] = uw + cv, uw - cv
+    out[1, 2], out[2, 1] = vw - cu, vw + cu
+    return out
 
 
 def rotations_of(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
