@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from hexafix.benchmark.recognition import random_layout, random_pose
@@ -10,7 +12,7 @@ from hexafix.errors import (
 )
 from hexafix.geometry import Pose
 from hexafix.hardware import MarkerLayout
-from hexafix.recognition import number_balls
+from hexafix.recognition import number_balls, numbering
 from hexafix.recognition.choices import OTHER_BALLS_LIMIT_MM, UNIQUENESS_LIMIT_MM
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -299,3 +301,38 @@ def test_twenty_four_even_markers_a_ring_are_refused_and_not_searched_for_ever(i
     points, *_ = image_of_rings(rings[0], rings[1], seed=15, extra=10)
     with pytest.raises(NumberingAmbiguous):
         number_balls(points, proximal=rings[0], distal=rings[1])
+
+
+def test_a_near_decoy_is_refused_even_when_the_noise_is_said_to_be_small(
+    image_of_rings, a_proximal_layout, a_distal_layout
+):
+    points, where, *_ = image_of_rings(a_proximal_layout, a_distal_layout, seed=5, noise_mm=0.0)
+    near = np.vstack([points, points[where[2]] + [0.6, 0.3, -0.4]])
+    rings = {"proximal": a_proximal_layout, "distal": a_distal_layout}
+    with pytest.raises(NumberingAmbiguous):
+        number_balls(near, **rings, noise_mm=0.01)
+
+
+def test_struts_never_settle_on_numbers_that_miss_the_layout(image_of_rings, a_distal_layout):
+    near = layout_at([0, 105, 235])
+    points, *_ = image_of_rings(near, a_distal_layout, seed=3)
+    answers = iter([30.0, 0.1])
+    with pytest.raises(NumberingAmbiguous, match="do not settle"):
+        number_balls(
+            points, proximal=near, distal=a_distal_layout, judge=lambda a, b: next(answers)
+        )
+
+
+def test_a_search_cut_short_is_refused_and_never_judged(
+    image_of_rings, a_proximal_layout, a_distal_layout, monkeypatch
+):
+    full = numbering.search
+    monkeypatch.setattr(
+        numbering, "search", lambda *a, **k: dataclasses.replace(full(*a, **k), complete=False)
+    )
+    points, *_ = image_of_rings(a_proximal_layout, a_distal_layout, seed=9)
+    rings = {"proximal": a_proximal_layout, "distal": a_distal_layout}
+    for judge in (None, lambda a, b: 0.0):
+        with pytest.raises(NumberingAmbiguous) as caught:
+            number_balls(points, **rings, judge=judge)
+        assert caught.value.faults[0].code == "numbering-too-symmetric"

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from hexafix.errors import ImageRefused, InputError, Refused
 from hexafix.hardware import MarkerLayout
@@ -94,3 +95,12 @@ def test_a_mirrored_image_is_refused_under_the_users_numbers(
     with pytest.raises(ImageRefused) as caught:
         check_user_numbering(assigned, points, proximal=an_unequal_layout, distal=distal)
     assert caught.value.faults[0].hazard == "H01"
+
+
+def test_the_right_numbers_on_a_distorted_image_are_refused(a_picked_case):
+    assigned, points, _, rings = a_picked_case
+    scale = np.array([1.01, 1.01, 1.0])
+    stretched = {number: np.array(place) * scale for number, place in assigned.items()}
+    with pytest.raises(Refused) as caught:
+        check_user_numbering(stretched, points * scale, **rings)
+    assert caught.value.faults[0].code == "numbering-does-not-fit"
