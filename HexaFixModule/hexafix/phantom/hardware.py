@@ -50,7 +50,7 @@ def plate(pose: Pose, ring: Ring, hu: float) -> Solid:
     pitch = np.float32(2.0 * np.pi / HOLES)
 
     def distance(x: Array, y: Array, z: Array) -> tuple[Array, ...]:
-        rho = np.hypot(x, y)
+        rho = np.sqrt(x * x + y * y)
         angle = np.arctan2(y, x)
         angle = angle - pitch * np.rint(angle / pitch)
         hole = HOLE_RADIUS_MM - np.hypot(rho * np.cos(angle) - middle, rho * np.sin(angle))

@@ -63,7 +63,7 @@ def _skin_distance(spec: PhantomSpec, scene: Scene) -> Callable[[Array, Array, A
         u = x - share * (jump[0] + slope[0] * z) + back
         v = (y - share * (jump[1] + slope[1] * z)) * np.float32(1.08)
         girth = radius * (1 + np.float32(0.0011) * np.clip(z, -150.0, 150.0))
-        return np.hypot(u, v) - girth
+        return np.sqrt(u * u + v * v) - girth
 
     return distance
 
@@ -104,7 +104,7 @@ def _fragment(spec: PhantomSpec, scene: Scene, *, upper: bool) -> list[Solid]:
         swell = flare(z)
         radius = shaft * (1.0 + 0.09 * np.cos(3.0 * angle)) + 13.0 * swell
         radius = radius + 2.0 * swell * np.cos(2.0 * angle)
-        wall = np.hypot(x, y) - radius
+        wall = np.sqrt(x * x + y * y) - radius
         end = np.sqrt(x * x + y * y + (z + 92.0) ** 2) - (shaft + 14.0)
         return np.where(z < -92.0, end, wall)
 
