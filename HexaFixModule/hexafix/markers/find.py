@@ -158,7 +158,8 @@ def _shape(
 def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -> Ball:
     """The value, with its covariance and what the user should look at."""
     center, method = rays.center_mm, "gradient-rays"
-    covariance = centre_covariance(rays, model)
+    by_model = thick and model is not None
+    covariance = centre_covariance(rays, model, by_model=by_model)
     warnings = []
     if rays.clipped_share > CLIPPED_SHARE:
         warnings.append(
@@ -169,7 +170,7 @@ def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -
         apart = float(np.linalg.norm(model.center_mm - rays.center_mm))
         if apart > max(DISAGREEMENT_MM, 4.0 * float(np.sqrt(np.trace(covariance)))):
             warnings.append(f"the two fits of this ball lie {apart:.2f} mm apart")
-        if thick:
+        if by_model:
             center, method = model.center_mm, "model-fit"
     return Ball(
         center, 2.0 * fitted, covariance, rays.rms_mm, rays.core_hu, method, tuple(warnings)
