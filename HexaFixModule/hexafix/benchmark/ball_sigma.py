@@ -102,8 +102,9 @@ def most_likely(error: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArr
     best = np.zeros(terms.shape[1])
     for start in range(4):
         first = np.random.default_rng(start).normal(-0.5, 1.0, terms.shape[1])
-        options = {"maxiter": 12_000, "maxfev": 12_000, "fatol": 1e-7, "xatol": 1e-4}
-        found = minimize(cost, first, method="Nelder-Mead", options=options)
+        found = minimize(
+            cost, first, method="Nelder-Mead", options={"maxiter": 12_000, "fatol": 1e-7}
+        )
         best = found.x if start == 0 or found.fun < cost(best) else best
     return np.exp(best)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,9 @@ class Crop:
     def _spline(self) -> NDArray[np.float64]:
         return spline_filter(self.voxels, order=3, mode="mirror")
 
-    def sample(self, points_mm: NDArray[np.float64], order: int = 3) -> NDArray[np.float64]:
+    def sample(
+        self, points_mm: NDArray[np.float64], order: Literal[1, 3] = 3
+    ) -> NDArray[np.float64]:
         """HU at LPS points, shape (..., 3) to (...), by the spline of order 3 or 1."""
         index = (self.volume.ijk_from_lps(points_mm) - self.first_ijk)[..., ::-1].reshape(-1, 3)
         source = self._spline if order == 3 else self.voxels

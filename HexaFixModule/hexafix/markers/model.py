@@ -199,4 +199,4 @@ def _step(
     normal = columns.T @ weighted
     diagonal = np.diag_indices_from(normal)
     normal[diagonal] += 1e-7 * normal[diagonal] + 1e-9
-    return np.linalg.solve(normal, weighted.T @ values), normal
+    return np.asarray(np.linalg.solve(normal, weighted.T @ values), float), normal

@@ -132,7 +132,7 @@ def _one_pass(
     directions = sphere_directions(count)
     half = HALF_KERNEL + round(window / STEP_MM)
     distance = radius + STEP_MM * np.arange(-half, half + 1)
-    distance = distance[distance > 0.1 * radius]
+    distance = np.asarray(distance[distance > 0.1 * radius], float)
     profile = crop.sample(center + directions[:, None, :] * distance[:, None])
     core_hu, core_noise, clipped = crop.core(center, 0.6 * nominal)
     away = nominal + SHELL_MM[:, None, None]
