@@ -6,7 +6,7 @@ from hexafix.correction import make_schedule
 from hexafix.correction.stroke import stroke_along
 from hexafix.errors import InputError, Refused, StrutOutOfRange
 from hexafix.geometry import Pose
-from hexafix.kinematics import forward_kinematics, strut_lengths
+from hexafix.kinematics import forward_kinematics, strut_lengths, strut_lengths_batch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -211,3 +211,22 @@ def test_both_fragments_strain_the_struts_alike(pose, path_of, rules, schedule_o
     np.testing.assert_array_equal(a.stroke.max_mm, b.stroke.max_mm)
     for row, other in zip(a.rows[1:], b.rows[1:], strict=True):
         np.testing.assert_allclose(row.strut_mm, other.strut_mm, atol=0.5 + 1e-9)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    angles=st.tuples(turn, turn, turn),
+    offset=st.tuples(shift, shift, shift),
+    step=st.sampled_from([0.5, 1.0]),
+)
+def test_a_strut_turns_only_the_way_its_length_goes_and_days_keep_the_rate_and_a_step(
+    fixator, pose, path_of, rules, schedule_of, angles, offset, step
+):
+    path = path_of(pose(), pose(np.add((0.0, 0.0, 185.0), offset), angles))
+    schedule = schedule_of(path, rules(strut_step_mm=step))
+    assert schedule.realised_max_mm_per_day <= 1.0 + step
+    values = np.array([row.strut_mm for row in schedule.rows])
+    s = np.arange(len(values)) / max(len(values) - 1, 1)
+    rotations, positions = path.poses(s)
+    ideal = strut_lengths_batch(rotations=rotations, positions_mm=positions, fixator=fixator)
+    assert not np.any(np.diff(values, axis=0) * np.diff(ideal, axis=0) < -1e-9)

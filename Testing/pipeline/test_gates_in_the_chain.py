@@ -198,7 +198,11 @@ def test_a_gate_refuses_beyond_its_limit_only(gate, good, bad):
 
 
 def test_every_red_gate_is_named_at_once():
-    red = [gates.ring_rms("proximal", 9.0), gates.ring_rms("distal", 9.0), gates.well_conditioned(1)]
+    red = [
+        gates.ring_rms("proximal", 9.0),
+        gates.ring_rms("distal", 9.0),
+        gates.well_conditioned(1),
+    ]
     with pytest.raises(Refused) as error:
         gates.decide(red)
     assert len(error.value.faults) == 2

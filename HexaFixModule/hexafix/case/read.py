@@ -238,8 +238,8 @@ def _correction(kind: Any) -> Correction | None:
     if kind.kind == "landmarks":
         return Landmarks(
             moving=kind.moving,
-            moving_points_lps_mm=np.array(kind.moving_points_lps_mm),
-            fixed_points_lps_mm=np.array(kind.fixed_points_lps_mm),
+            moving_points_mm=np.array(kind.moving_points_lps_mm),
+            fixed_points_mm=np.array(kind.fixed_points_lps_mm),
         )
     return checks.deformity_of(kind.model_dump())
 

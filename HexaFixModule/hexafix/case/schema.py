@@ -98,17 +98,17 @@ class DeformityKind(_Strict):
     kind: Literal["deformity"]
     moving: Side = "distal"
     origin_lps_mm: Point
-    ap_angulation_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0
+    ap_angulation_deg: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     ap_angulation: Literal["varus", "valgus"] | None = None
-    lateral_angulation_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0
+    lateral_angulation_deg: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     lateral_angulation: Literal["apex-anterior", "apex-posterior"] | None = None
-    axial_rotation_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0
+    axial_rotation_deg: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     axial_rotation: Literal["internal", "external"] | None = None
-    ap_translation_mm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
+    ap_translation_mm: Annotated[float, Field(ge=0.0, le=150.0)] = 0.0
     ap_translation: Literal["medial", "lateral"] | None = None
-    lateral_translation_mm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
+    lateral_translation_mm: Annotated[float, Field(ge=0.0, le=150.0)] = 0.0
     lateral_translation: Literal["anterior", "posterior"] | None = None
-    axial_translation_mm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
+    axial_translation_mm: Annotated[float, Field(ge=0.0, le=150.0)] = 0.0
     axial_translation: Literal["short", "long"] | None = None
 
 

@@ -6,6 +6,8 @@ from hexafix.correction.compensation import (
     RecognisedRings,
     compensate,
     motion_between,
+    reading_covariance,
+    reading_resolution_mm,
     target_of,
 )
 from hexafix.correction.landmarks import LandmarkFit, fit_landmarks
@@ -42,6 +44,8 @@ __all__ = [
     "make_schedule",
     "motion_between",
     "planned_motion",
+    "reading_covariance",
+    "reading_resolution_mm",
     "target_of",
     "watched_points",
 ]

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from hexafix.correction.fragment import FragmentMotion, Moving, TargetPose
 from hexafix.errors import InputError
 from hexafix.geometry import Pose, skew
+from hexafix.hardware import Fixator
+from hexafix.kinematics import strut_jacobian
 
 CompensationMode = Literal["fused", "additive", "none"]
 
-FUSION_STEPS = 3
+FUSION_STEPS = 6
 """Gauss-Newton steps of the split; the second changes the poses by less than 1e-4 mm."""
 
 
@@ -80,7 +82,11 @@ class Compensation:
 
 
 def compensate(
-    rings: RecognisedRings, *, theoretical: Pose, mode: CompensationMode = "fused"
+    rings: RecognisedRings,
+    *,
+    theoretical: Pose,
+    mode: CompensationMode = "fused",
+    theoretical_covariance: ArrayLike | None = None,
 ) -> Compensation:
     """Bring the recognised rings and the struts' pose together.
 
@@ -92,6 +98,9 @@ def compensate(
     mode : {'fused', 'additive', 'none'}
         `fused` moves both ring poses in the image, each by what its covariance lets it, until
         they agree with the struts; `additive` is the paper's rule; `none` ignores the struts.
+    theoretical_covariance : array_like, shape (6, 6), optional
+        Of ξ in X_t exp(ξ), mm and radians, from `reading_covariance`; without, the struts are
+        taken as exact, as the paper does.
 
     Notes
     -----
@@ -107,41 +116,101 @@ def compensate(
         )
     proximal, distal = rings.proximal, rings.distal
     if mode == "fused":
-        proximal, distal = fuse_rings(rings, theoretical=theoretical)
+        proximal, distal = fuse_rings(
+            rings, theoretical=theoretical, theoretical_covariance=theoretical_covariance
+        )
     return Compensation(mode, theoretical, rings.mechanism, proximal, distal)
 
 
-def fuse_rings(rings: RecognisedRings, *, theoretical: Pose) -> tuple[Pose, Pose]:
-    """Ring poses that agree with the struts, as likely as possible.
+def fuse_rings(
+    rings: RecognisedRings,
+    *,
+    theoretical: Pose,
+    theoretical_covariance: ArrayLike | None = None,
+) -> tuple[Pose, Pose]:
+    """Ring poses that agree with image and struts, as likely as possible.
 
     Parameters
     ----------
     rings : RecognisedRings
     theoretical : Pose
         X_t, {A} in {B}.
+    theoretical_covariance : array_like, shape (6, 6), optional
+        Of ξ_t in X_t exp(ξ_t); without, X_t is exact.
 
     Returns
     -------
     tuple of Pose
-        Corrected T_A and T_B in LPS, with T_B⁻¹ T_A = X_t exactly.
+        Corrected T_A and T_B in LPS, with T_B⁻¹ T_A = X_t exp(ξ_t) exactly.
 
     Notes
     -----
-    Minimises ξ_Aᵀ C_A⁻¹ ξ_A + ξ_Bᵀ C_B⁻¹ ξ_B under (T_B exp ξ_B)⁻¹ (T_A exp ξ_A) = X_t. With ξ_B
-    as the unknown the constraint gives T_A' = T_B exp(ξ_B) X_t and
-    ξ_A = log(T_A⁻¹ T_B exp(ξ_B) X_t); Gauss-Newton on ξ_B with Ad(X_t⁻¹) as its slope.
+    Minimises ξ_Aᵀ C_A⁻¹ ξ_A + ξ_Bᵀ C_B⁻¹ ξ_B + ξ_tᵀ C_t⁻¹ ξ_t under
+    (T_B exp ξ_B)⁻¹ (T_A exp ξ_A) = X_t exp ξ_t. With ξ_B and ξ_t as the unknowns the constraint
+    gives ξ_A = log(T_A⁻¹ T_B exp(ξ_B) X_t exp(ξ_t)); Gauss-Newton with the slopes Ad(X_t⁻¹)
+    and 1. Departs: the paper takes X_t as exact; a reading in half millimetres is not.
     """
     weight_a = np.linalg.inv(rings.proximal_covariance)
-    weight_b = np.linalg.inv(rings.distal_covariance)
+    prior = np.linalg.inv(rings.distal_covariance)
     slope = adjoint(theoretical.inverse())
-    normal = slope.T @ weight_a @ slope + weight_b
+    if theoretical_covariance is not None:
+        weight_t = np.linalg.inv(np.asarray(theoretical_covariance, float))
+        prior = np.block([[prior, np.zeros((6, 6))], [np.zeros((6, 6)), weight_t]])
+        slope = np.hstack([slope, np.eye(6)])
+    normal = slope.T @ weight_a @ slope + prior
     recognised = rings.proximal.inverse() @ rings.distal
-    xi_b = np.zeros(6)
+    unknown, struts = np.zeros(slope.shape[1]), theoretical
     for _ in range(FUSION_STEPS):
-        xi_a = (recognised @ Pose.exp(xi_b) @ theoretical).log()
-        xi_b = xi_b - np.linalg.solve(normal, slope.T @ weight_a @ xi_a + weight_b @ xi_b)
-    distal = rings.distal @ Pose.exp(xi_b)
-    return distal @ theoretical, distal
+        xi_a = (recognised @ Pose.exp(unknown[:6]) @ struts).log()
+        unknown = unknown - np.linalg.solve(normal, slope.T @ weight_a @ xi_a + prior @ unknown)
+        if theoretical_covariance is not None:
+            struts = theoretical @ Pose.exp(unknown[6:])
+    distal = rings.distal @ Pose.exp(unknown[:6])
+    return distal @ struts, distal
+
+
+def reading_resolution_mm(readings_mm: ArrayLike, *, step_mm: float) -> float:
+    """How finely the readings were given: the strut's step, or the decimals that were written.
+
+    Parameters
+    ----------
+    readings_mm : array_like, shape (6,)
+        Scale readings, mm.
+    step_mm : float
+        Step of the strut's scale.
+
+    Notes
+    -----
+    Readings that are all whole steps were read to a step; others as finely as their last decimal.
+    """
+    readings = np.asarray(readings_mm, float)
+    for resolution in (step_mm, 1.0, 0.5, 0.1, 0.05, 0.01, 0.001):
+        turns = readings / resolution
+        if resolution <= step_mm and np.all(np.abs(turns - np.round(turns)) < 1e-6):
+            return float(resolution)
+    return 0.001
+
+
+def reading_covariance(
+    pose: Pose, fixator: Fixator, *, resolution_mm: float
+) -> NDArray[np.float64]:
+    """Covariance of the struts' pose from the resolution of the readings, shape (6, 6).
+
+    Parameters
+    ----------
+    pose : Pose
+        X_t, {A} in {B}.
+    fixator : Fixator
+    resolution_mm : float
+        Each reading is off by up to half of it, evenly.
+
+    Returns
+    -------
+    ndarray
+        Of ξ in X_t exp(ξ), mm and radians: J⁻¹ J⁻ᵀ times the variance of a reading.
+    """
+    inverse = np.linalg.inv(strut_jacobian(pose, fixator))
+    return inverse @ inverse.T * resolution_mm**2 / 12.0
 
 
 def target_of(goal: TargetPose | FragmentMotion, compensation: Compensation) -> Pose:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from hexafix.errors import StrutOutOfRange
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
-from hexafix.kinematics import strut_jacobian_batch, strut_lengths_batch
+from hexafix.kinematics import strut_lengths_batch
 from hexafix.kinematics.newton import solve_rows
 
 ROTATION_WEIGHT_MM = 60.0
@@ -20,8 +20,11 @@ Half the distance over which a limb shows it: with it the best choice halves the
 rounding leaves at a fracture and turns the bone no more; at 0 it would turn it twice as much.
 """
 
-FINALISTS = 24
-"""How many of the 64 choices, ranked by the linear model, are solved exactly."""
+EVENNESS = 4
+"""Power of a row's error in the sum that a path's rows minimise: large errors weigh more."""
+
+TRIES, PRICE = 24, 1.6
+"""Sequences tried to keep the day's way, and the factor on the price of a row in a long day."""
 
 _OUTSIDE = 1e6  # cost of a choice outside the stroke
 
@@ -65,7 +68,7 @@ def round_rows(
     most_way_mm: float | None = None,
     rows_a_day: int = 1,
 ) -> RoundedRows:
-    """Round every row by itself, so that no error is carried from row to row.
+    """Round every row to whole steps; no error is carried from row to row.
 
     Parameters
     ----------
@@ -78,16 +81,18 @@ def round_rows(
     step_mm : float
         Step of the struts' scale; readings are its multiples, length = reading + offset.
     watched_in_a_mm : array_like, shape (S, P, 3), optional
+        With it and `most_way_mm` the rows follow one another in time: no strut is ever turned
+        against the path's own direction, which a patient would misread (H42). Without, each row
+        is for itself.
     most_way_mm : float, optional
-        Way that no watched point should exceed within a day (`rows_a_day` rows). Among the
-        finalists of a row the best one that keeps it is taken, the best one if none does.
+        Way that no watched point should exceed within a day (`rows_a_day` rows); kept where the
+        sequences tried keep it.
     rows_a_day : int
 
     Notes
     -----
     The error of a choice is √(mean |δp|² + (w δθ)²) over the points, w = `ROTATION_WEIGHT_MM`.
-    The Jacobian ranks all 64; the first `FINALISTS` are solved by forward kinematics and ranked
-    again, so the result is the exact best.
+    All 64 choices of every row are solved by forward kinematics, so the best is exact.
     """
     r, p = np.asarray(rotations, float), np.asarray(positions_mm, float)
     points = np.asarray(interest_in_a_mm, float)
@@ -100,17 +105,15 @@ def round_rows(
     steps = below[:, None, :] + _CHOICES * open_[:, None, :]
     lengths = np.asarray(steps * step_mm + offset, np.float64)
     outside = np.any((lengths < strut.min_mm - 1e-9) | (lengths > strut.max_mm + 1e-9), axis=-1)
-    cost = _linear_cost(lengths - ideal[:, None, :], r, p, points, fixator) + _OUTSIDE * outside
-    finalists = np.argsort(cost, axis=1, kind="stable")[:, :FINALISTS]
-    chosen_lengths = np.take_along_axis(lengths, finalists[:, :, None], axis=1)
-    exact = _Exact.of(chosen_lengths, r, p, points, fixator)
-    exact.cost[np.take_along_axis(outside, finalists, axis=1)] += _OUTSIDE
+    exact = _Exact.of(lengths, r, p, points, fixator)
+    exact.cost[outside] += _OUTSIDE
     best = exact.cost.argmin(axis=1)
     if watched_in_a_mm is not None and most_way_mm is not None:
-        best = _choose(exact, np.asarray(watched_in_a_mm, float), most_way_mm, rows_a_day)
+        ways = _DaysWays(exact, np.asarray(watched_in_a_mm, float), rows_a_day)
+        best = _along_path(exact, steps, in_steps, ways, most_way_mm)
     rows = np.arange(len(r))
     _refuse_impossible(exact.cost[rows, best], step_mm, fixator)
-    chosen_steps = steps[rows, finalists[rows, best]]
+    chosen_steps = steps[rows, best]
     return RoundedRows(
         steps=chosen_steps,
         readings_mm=np.round(chosen_steps.astype(np.float64) * step_mm, 9),
@@ -140,7 +143,7 @@ def displacements(
 
 @dataclass(frozen=True, eq=False)
 class _Exact:
-    """Finalists solved by forward kinematics, arrays of shape (S, F, ...)."""
+    """All choices solved by forward kinematics, arrays of shape (S, 64, ...)."""
 
     rotations: NDArray[np.float64]
     positions: NDArray[np.float64]
@@ -180,39 +183,79 @@ class _Exact:
         return cls(rotations, positions, moved.max(axis=-1), turn, cost)
 
 
-def _linear_cost(
-    errors: NDArray[np.float64],
-    r: NDArray[np.float64],
-    p: NDArray[np.float64],
-    points: NDArray[np.float64],
-    fixator: Fixator,
-) -> NDArray[np.float64]:
-    """Cost of length errors, shape (S, 64, 6), by the Jacobian, shape (S, 64)."""
-    jacobian = strut_jacobian_batch(rotations=r, positions_mm=p, fixator=fixator)
-    twists = errors @ np.swapaxes(np.linalg.inv(jacobian), -1, -2)
-    shift, turn = twists[..., :3], twists[..., 3:]
-    moved = shift[:, :, None, :] + np.cross(turn[:, :, None, :], points[:, None])
-    square = np.mean(np.sum(moved**2, axis=-1), axis=-1)
-    return np.sqrt(square + ROTATION_WEIGHT_MM**2 * np.sum(turn**2, axis=-1))
+@dataclass(frozen=True, eq=False)
+class _DaysWays:
+    """Ways of the watched points within a day for a sequence of choices."""
+
+    exact: _Exact
+    watched: NDArray[np.float64]
+    rows_a_day: int
+
+    def of(self, best: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Largest way from each row to the row a day later, mm."""
+        rows, day = np.arange(len(best)), self.rows_a_day
+        r, p = self.exact.rotations[rows, best], self.exact.positions[rows, best]
+        return displacements(
+            points_in_a_mm=self.watched[day:],
+            from_rotations=r[:-day],
+            from_positions=p[:-day],
+            to_rotations=r[day:],
+            to_positions=p[day:],
+        ).max(axis=-1, initial=0.0)
+
+
+def _along_path(
+    exact: _Exact,
+    steps: NDArray[np.int64],
+    in_steps: NDArray[np.float64],
+    ways: _DaysWays,
+    most_way_mm: float,
+) -> NDArray[np.int64]:
+    """A sequence that turns no strut back and, where one is found, keeps the day's way.
+
+    Sequences are tried with a growing price on the two ends of every day that is too long; the
+    one with the shortest longest day counts.
+    """
+    loss = exact.cost**EVENNESS
+    shortest, found = np.inf, exact.cost.argmin(axis=1)
+    for _ in range(TRIES):
+        best = _choose(loss, steps, in_steps)
+        way = ways.of(best)
+        longest = float(way.max(initial=0.0))
+        if longest < shortest:
+            shortest, found = longest, best
+        if longest <= most_way_mm:
+            break
+        starts = np.flatnonzero(way > most_way_mm)
+        for rows in (starts, starts + ways.rows_a_day):
+            loss[rows, best[rows]] = PRICE * loss[rows, best[rows]] + 1e-6
+    return found
 
 
 def _choose(
-    exact: _Exact, watched: NDArray[np.float64], most_way_mm: float, rows_a_day: int
+    loss: NDArray[np.float64], steps: NDArray[np.int64], in_steps: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Best finalist of each row; where possible one that keeps the day's way."""
-    order = np.argsort(exact.cost, axis=1, kind="stable")
-    best = order[:, 0].copy()
-    for row in range(1, len(best)):
-        before = max(row - rows_a_day, 0)
-        way = displacements(
-            points_in_a_mm=watched[row],
-            from_rotations=exact.rotations[before, best[before]],
-            from_positions=exact.positions[before, best[before]],
-            to_rotations=exact.rotations[row],
-            to_positions=exact.positions[row],
-        ).max(axis=-1)
-        keeps = [k for k in order[row] if way[k] <= most_way_mm and exact.cost[row, k] < _OUTSIDE]
-        best[row] = keeps[0] if keeps else order[row, 0]
+    """The choices along a path that turn no strut back with the least sum of losses, shape (S,).
+
+    By dynamic programming over all sequences in which every strut moves only where the path moves
+    it. Such a sequence always exists: the floor of a strut that becomes shorter, the ceil of one
+    that becomes longer.
+    """
+    total = loss[0] * 0.0
+    came_from = np.zeros((len(steps), steps.shape[1]), np.int64)
+    # today's row is as it was read, whatever is chosen there
+    before = np.broadcast_to(in_steps[0], steps[0].shape)
+    for row in range(1, len(steps)):
+        direction = in_steps[row] - in_steps[row - 1]
+        moved = (steps[row][None, :, :] - before[:, None, :]) * direction
+        arrive = np.where(np.any(moved < -1e-9, axis=-1), np.inf, total[:, None])
+        came_from[row] = arrive.argmin(axis=0)
+        total = arrive[came_from[row], np.arange(arrive.shape[1])] + loss[row]
+        before = steps[row]
+    best = np.zeros(len(steps), np.int64)
+    best[-1] = total.argmin()
+    for row in range(len(steps) - 1, 0, -1):
+        best[row - 1] = came_from[row, best[row]]
     return best
 
 

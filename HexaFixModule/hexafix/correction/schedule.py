@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,9 @@ from hexafix.kinematics import MAX_CONDITION
 
 STROKE_TOLERANCE_MM = 1e-6
 """A strut at its limit to rounding error is within it."""
+
+MORE_DAYS = 10
+"""Days added at most so that whole steps of the struts keep a day's way (rate and one step)."""
 
 MAX_ADJUSTMENTS_PER_DAY = 24
 """More than one adjustment an hour is a motor's work, not a patient's."""
@@ -145,6 +148,23 @@ def make_schedule(
             hazard="H31",
             next_step="plan the correction in two stages, or mount the frame otherwise",
         )
+    for _ in range(MORE_DAYS + 1):
+        schedule = _rounded(path, fixator, rules, readings, pace, stroke)
+        if schedule.realised_max_mm_per_day <= rules.max_rate_mm_per_day + rules.strut_step_mm:
+            break
+        pace = _one_more_day(pace)
+    return schedule
+
+
+def _rounded(
+    path: RigidPath,
+    fixator: Fixator,
+    rules: ScheduleRules,
+    readings: NDArray[np.float64],
+    pace: Pace,
+    stroke: StrokeCheck,
+) -> StrutSchedule:
+    """The schedule in whole steps over the days of `pace`."""
     s = path_parameters(pace.days, rules.adjustments_per_day)
     rotations, positions = path.poses(s)
     watched = path.in_proximal(path.watched.points_mm, s)
@@ -159,6 +179,18 @@ def make_schedule(
         rows_a_day=rules.adjustments_per_day,
     )
     return _assemble(path, rules, readings, pace, stroke, rounded, watched)
+
+
+def _one_more_day(pace: Pace) -> Pace:
+    """The same path over one day more, because whole steps of the struts need it."""
+    slower = pace.days / (pace.days + 1)
+    return replace(
+        pace,
+        days=pace.days + 1,
+        ruling="whole strut steps",
+        rate_mm_per_day=pace.rate_mm_per_day * slower,
+        rate_rad_per_day=pace.rate_rad_per_day * slower,
+    )
 
 
 def _assemble(

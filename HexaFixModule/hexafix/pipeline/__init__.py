@@ -5,7 +5,8 @@ forward_kinematics → correction target, compensation → make_schedule → rep
 """
 
 from hexafix.pipeline.layout import check_case_layout
-from hexafix.pipeline.plan import Plan, plan_and_export, plan_correction
+from hexafix.pipeline.plan import Plan, plan_correction
+from hexafix.pipeline.prescribe import plan_and_export
 from hexafix.pipeline.recognise import Recognised, find_markers, recognise, recognise_case
 
 __all__ = [

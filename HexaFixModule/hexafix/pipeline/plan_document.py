@@ -24,7 +24,7 @@ NOTICE = (
 )
 LIBRARIES = ("numpy", "scipy", "SimpleITK", "pydicom", "pydantic", "typst", "pypdf")
 LEFT = {
-    "fused": "both ring poses were moved to agree with the struts, each within its uncertainty",
+    "fused": "image and readings were weighed by their uncertainties and both ring poses corrected",
     "additive": "the difference of the pose vectors was subtracted from the target (Eq. 32)",
     "none": "the recognised ring poses were used as they are",
 }
@@ -73,27 +73,28 @@ def versions() -> dict[str, str]:
 
 def _struts(plan: Plan) -> dict[str, Any]:
     """What the readings say of the mechanism, and how far the CT agrees."""
-    recognised, forward = plan.recognised.mechanism.pose, plan.forward
+    recognised, forward = plan.recognised.mechanism.pose, plan.struts.forward
     distance, angle = recognised.difference(forward.pose)
-    vector = plan.compensation.pose_vector_difference
+    vector = plan.struts.compensation.pose_vector_difference
     return {
         "from_struts": {
             **pose_document(forward.pose),
             "condition_number": rounded(forward.condition_number, 6),
             "iterations": forward.iterations,
+            "reading_resolution_mm": plan.struts.reading_resolution_mm,
         },
         "difference": {
             "position_mm": rounded(vector[:3]),
             "angles_deg": rounded(np.degrees(vector[3:])),
             "distance_mm": rounded(distance),
             "rotation_deg": rounded(float(np.degrees(angle))),
-            "struts_mm": rounded(plan.witness.differences_mm),
+            "struts_mm": rounded(plan.struts.witness.differences_mm),
         },
     }
 
 
 def _correction(plan: Plan) -> dict[str, Any]:
-    correction, compensation = plan.case.correction, plan.compensation
+    correction, compensation = plan.case.correction, plan.struts.compensation
     kind = plan.case.document["correction"]["kind"]
     result = {
         "kind": kind,

@@ -8,10 +8,27 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from hexafix import gates
+from hexafix.case import Case
+from hexafix.correction import (
+    Compensation,
+    RecognisedRings,
+    compensate,
+    reading_covariance,
+    reading_resolution_mm,
+)
+from hexafix.errors import HexaFixError
 from hexafix.gates import STRUT_LIMIT_MM
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
-from hexafix.kinematics import strut_lengths
+from hexafix.kinematics import (
+    BasinCheck,
+    ForwardSolution,
+    forward_kinematics,
+    second_starts,
+    strut_lengths,
+)
+from hexafix.pipeline.recognise import Recognised
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,3 +79,70 @@ def _better_order(by_ct: NDArray, lengths: NDArray) -> str | None:
         return None
     given = ", ".join(str(k + 1) for k in best)
     return f"the readings would fit in the order {given}"
+
+
+@dataclass(frozen=True, eq=False)
+class WeighedStruts:
+    """What the readings say, and image and readings brought together.
+
+    Attributes
+    ----------
+    witness : StrutWitness
+        Strut lengths by CT against the readings.
+    forward : ForwardSolution
+        X_t, the mechanism pose from today's readings.
+    basin : BasinCheck
+        Whether other starts of the forward kinematics agree.
+    reading_resolution_mm : float
+        How finely the readings were given.
+    compensation : Compensation
+    gates : tuple of Gate
+        G6 and G8, decided.
+    """
+
+    witness: StrutWitness
+    forward: ForwardSolution
+    basin: BasinCheck
+    reading_resolution_mm: float
+    compensation: Compensation
+    gates: tuple[gates.Gate, ...]
+
+
+def weigh_struts(case: Case, recognised: Recognised) -> WeighedStruts:
+    """Compare the readings with the image, solve the mechanism from them, and compensate.
+
+    Raises
+    ------
+    Refused
+        If readings and image disagree (G6) or the mechanism's pose is not certain (G8).
+    """
+    if case.strut_readings_mm is None or case.schedule is None:
+        raise HexaFixError.of("not-plannable", "a plan needs strut readings and a schedule")
+    readings, seen = case.strut_readings_mm, recognised.mechanism.pose
+    lengths = readings + case.fixator.strut.scale_offset_mm
+    witness = compare_struts(seen, case.fixator, lengths_mm=lengths)
+    agree = gates.struts_agree(witness.differences_mm, better_order=witness.better_order)
+    gates.decide([agree])
+    forward = forward_kinematics(lengths, case.fixator, start=seen)
+    basin = second_starts(lengths, case.fixator, solution=forward.pose)
+    resolution = reading_resolution_mm(readings, step_mm=case.schedule.strut_step_mm)
+    compensation = compensate(
+        RecognisedRings(
+            proximal=recognised.proximal.pose,
+            distal=recognised.distal.pose,
+            proximal_covariance=recognised.proximal.covariance,
+            distal_covariance=recognised.distal.covariance,
+        ),
+        theoretical=forward.pose,
+        mode=case.schedule.compensation,
+        theoretical_covariance=reading_covariance(
+            forward.pose, case.fixator, resolution_mm=resolution
+        ),
+    )
+    found = (
+        agree,
+        *gates.recognition_error(compensation.difference_mm, compensation.difference_rad),
+        gates.forward_basin(basin.worst_mm if basin.agree else np.inf, basin.count),
+    )
+    gates.decide(found)
+    return WeighedStruts(witness, forward, basin, resolution, compensation, found)

@@ -79,6 +79,11 @@ def recompute(document: dict[str, Any]) -> Recomputed:
         struts=struts,
     )
     checks += _pose_checks("target", goal, document["correction"]["target"])
+    resolution = document["mechanism"]["from_struts"]["reading_resolution_mm"]
+    turns = readings / resolution
+    checks.append(
+        largest("readings in the resolution stated", turns - np.round(turns), 1e-5, "steps")
+    )
     checks += _schedule_checks(document, fixator, offset, struts, goal, planned)
     last = np.array(document["schedule"]["rows"][-1]["strut_mm"], float) + offset
     reached = rigid.forward(last, fixator, goal)
@@ -130,7 +135,11 @@ def _compensated(
         np.array(document["rings"][side]["covariance"], float) * np.outer(to_rad, to_rad)
         for side in ("proximal", "distal")
     ]
-    return rigid.fuse(rings["proximal"], rings["distal"], *covariances, struts)
+    resolution = document["mechanism"]["from_struts"]["reading_resolution_mm"]
+    covariances.append(rigid.reading_covariance(struts, document["case"]["fixator"], resolution))
+    return rigid.fuse(
+        rings=(rings["proximal"], rings["distal"]), struts=struts, covariances=tuple(covariances)
+    )
 
 
 def _schedule_checks(

@@ -112,33 +112,47 @@ def along(start: Matrix, end: Matrix, s: NDArray[np.float64]) -> Matrix:
     return start @ expm(np.asarray(s)[:, None, None] * step)
 
 
+def reading_covariance(pose: Matrix, fixator: dict[str, Any], resolution_mm: float) -> Matrix:
+    """Covariance of ξ in X exp(ξ) from readings good to half a resolution, by differences."""
+    step = 1e-5
+
+    def moved(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+        return strut_lengths(pose @ exponential(xi), fixator)
+
+    slopes = [(moved(xi) - moved(-xi)) / (2 * step) for xi in step * np.eye(6)]
+    inverse = np.linalg.inv(np.array(slopes).T)
+    return resolution_mm**2 / 12.0 * inverse @ inverse.T
+
+
+def exponential(xi: NDArray[np.float64]) -> Matrix:
+    """4×4 matrix of a twist (mm, rad), by scipy's `RigidTransform`."""
+    return RigidTransform.from_exp_coords(np.concatenate([xi[3:], xi[:3]])).as_matrix()
+
+
 def fuse(
-    proximal: Matrix, distal: Matrix, covariance_a: Matrix, covariance_b: Matrix, struts: Matrix
+    *, rings: tuple[Matrix, Matrix], struts: Matrix, covariances: tuple[Matrix, Matrix, Matrix]
 ) -> tuple[Matrix, Matrix]:
-    """Ring poses that agree with the struts' pose, as likely as possible, by `least_squares`.
+    """Ring poses that agree with image and struts, as likely as possible, by `least_squares`.
 
     Parameters
     ----------
-    proximal, distal : ndarray, shape (4, 4)
-        Recognised, LPS.
-    covariance_a, covariance_b : ndarray, shape (6, 6)
-        Of ξ = (mm, rad) in each ring's frame.
+    rings : pair of ndarray, shape (4, 4)
+        Recognised proximal and distal ring, LPS.
     struts : ndarray, shape (4, 4)
         X_t.
+    covariances : three ndarrays, shape (6, 6)
+        Of ξ = (mm, rad) of the proximal ring, the distal ring and X_t, each in its own frame.
     """
-    whiten_a = np.linalg.inv(np.linalg.cholesky(covariance_a))
-    whiten_b = np.linalg.inv(np.linalg.cholesky(covariance_b))
-    scale = np.array([1, 1, 1, 0.01, 0.01, 0.01])
+    proximal, distal = rings
+    whiten = [np.linalg.inv(np.linalg.cholesky(c)) for c in covariances]
 
-    def exponential(xi: NDArray[np.float64]) -> Matrix:
-        return RigidTransform.from_exp_coords(np.concatenate([xi[3:], xi[:3]])).as_matrix()
-
-    def residual(xi_b: NDArray[np.float64]) -> NDArray[np.float64]:
-        moved = np.linalg.solve(proximal, distal @ exponential(xi_b) @ struts)
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        moved = np.linalg.solve(proximal, distal @ exponential(x[:6]) @ struts @ exponential(x[6:]))
         coords = RigidTransform.from_matrix(moved).as_exp_coords()
         xi_a = np.concatenate([coords[3:], coords[:3]])
-        return np.concatenate([whiten_a @ xi_a, whiten_b @ xi_b])
+        return np.concatenate([whiten[0] @ xi_a, whiten[1] @ x[:6], whiten[2] @ x[6:]])
 
-    fit = least_squares(residual, np.zeros(6), x_scale=scale, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    corrected = distal @ exponential(fit.x)
-    return corrected @ struts, corrected
+    fit = least_squares(residual, np.zeros(12), x_scale=np.tile([1, 1, 1, 0.01, 0.01, 0.01], 2),
+                        xtol=1e-14, ftol=1e-14, gtol=1e-14)  # fmt: skip
+    corrected = distal @ exponential(fit.x[:6])
+    return corrected @ struts @ exponential(fit.x[6:]), corrected

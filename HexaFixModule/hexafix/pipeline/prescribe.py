@@ -1,0 +1,100 @@
+"""From a plan to the export: recompute by another road, print, read back, write."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hexafix import export, gates
+from hexafix.case import Case
+from hexafix.errors import HexaFixError
+from hexafix.imaging import Volume
+from hexafix.pipeline import plan_document
+from hexafix.pipeline.plan import Plan, plan_correction
+from hexafix.progress import Progress, silent
+from hexafix.report.pdf import prescription_pdf
+from hexafix.report.picture import SceneRenderer
+from hexafix.report.scene import SceneGeometry, sample_bone
+from hexafix.report.tables import markers_mrk_json, schedule_csv
+from hexafix.verify import check_printed, recompute
+
+
+def plan_and_export(
+    case: Case,
+    folder: Path,
+    *,
+    volume: Volume | None = None,
+    accept_relaxed_layout: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """The whole chain: plan, recompute by another road, print, read back, write.
+
+    Parameters
+    ----------
+    case : Case
+    folder : Path
+        Where the export goes, all or nothing.
+    volume, accept_relaxed_layout, progress
+        As in `plan_correction`.
+
+    Returns
+    -------
+    dict
+        The plan document, as ``plan.json`` holds it.
+
+    Raises
+    ------
+    Refused
+        If a gate is red; nothing is written and an older export stays as it is.
+    """
+    export.check_target(folder)
+    with SceneRenderer() as renderer:
+        plan = plan_correction(
+            case,
+            volume=volume,
+            accept_relaxed_layout=accept_relaxed_layout,
+            progress=progress,
+        )
+        document = plan_document.plan(plan)
+        renderer.show(_scene(document, plan))
+        progress("recompute by another road", 0.0)
+        document["gates"] += [gate.as_json() for gate in _recomputed(document)]
+        progress("recompute by another road", 1.0)
+        progress("set the prescription", 0.0)
+        files = {
+            "plan.json": json_bytes(document),
+            "schedule.csv": schedule_csv(document),
+            "markers.mrk.json": markers_mrk_json(document),
+            "prescription.pdf": prescription_pdf(document, pictures=renderer.result()),
+        }
+    wrong = check_printed(document, files)
+    if wrong:
+        raise HexaFixError.of(
+            "print-differs",
+            "what would be printed differs from the plan: " + "; ".join(wrong[:3]),
+            hazard="H41",
+            next_step="report this case; nothing was written",
+        )
+    progress("set the prescription", 1.0)
+    export.write_export(files, folder)
+    return document
+
+
+def json_bytes(document: dict[str, Any]) -> bytes:
+    """A document as it is written: the same content gives the same bytes."""
+    return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def _scene(document: dict[str, Any], plan: Plan) -> SceneGeometry:
+    bare = SceneGeometry.from_document(document)
+    bone = sample_bone(plan.recognised.volume, bare)
+    return SceneGeometry.from_document(document, bone=bone)
+
+
+def _recomputed(document: dict[str, Any]) -> tuple[gates.Gate, ...]:
+    """G9, decided."""
+    result = recompute(document)
+    found = gates.recomputed(result.distance_mm, result.rotation_deg)
+    gates.decide(found)
+    return found
