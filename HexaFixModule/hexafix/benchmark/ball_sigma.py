@@ -23,6 +23,15 @@ from hexafix.markers.rays import DIRECTIONS, fine_fit, rough_fit
 from hexafix.markers.uncertainty import TERMS, variance_terms
 from hexafix.phantom.local import Scene, render_ball
 
+MORE = (
+    Scene(rod_diameter_mm=0.0),
+    Scene(tissue_gap_mm=0.0),
+    Scene(streak_hu=400.0),
+    Scene(spacing_mm=(0.7, 0.7, 2.0)),
+    Scene(spacing_mm=(0.7, 0.7, 2.5), streak_hu=200.0),
+    Scene(spacing_mm=(0.7, 0.7, 3.0)),
+)
+"""Situations that count beside those of the benchmark."""
 OUTLIER = 12.0
 """Squared errors count up to this multiple of the stated variance."""
 
@@ -80,7 +89,7 @@ def observe(scene: Scene, rng: np.random.Generator) -> tuple[float, NDArray[np.f
 def calibrate(placements: int, seed: int = 1, *, thick: bool = False) -> NDArray[np.float64]:
     """Most likely weights of `TERMS`, shape (6,), all ≥ 0."""
     rng = np.random.default_rng(seed)
-    fixed = [scene for scene, _ in SITUATIONS.values()]
+    fixed = [scene for scene, _ in SITUATIONS.values()] + list(MORE)
     fixed = [scene for scene in fixed if (max(scene.spacing_mm) > THICK_SLICES_MM) == thick]
     seen = []
     for number in range(placements):

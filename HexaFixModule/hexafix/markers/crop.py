@@ -63,13 +63,15 @@ class Crop:
         plane = (j * a[:3, 1])[:, None] + (i * a[:3, 0])[None]
         return (first + k * a[:3, 2])[:, None, None] + plane
 
-    def core(self, center_mm: NDArray[np.float64], reach_mm: float) -> tuple[float, float, float]:
+    def core(
+        self, center_mm: NDArray[np.float64], reach_mm: float
+    ) -> tuple[float, float, float, float]:
         """HU within a distance of a point, LPS mm.
 
         Returns
         -------
         tuple of float
-            Median, robust standard deviation, and share at the crop's greatest value.
+            Median, robust standard deviation, share at the crop's greatest value, 5th percentile.
         """
         index = self.volume.ijk_from_lps(center_mm + reach_mm * _BALL) - self.first_ijk
         index = np.rint(index).astype(int)
@@ -77,7 +79,14 @@ class Crop:
         values = self.voxels[index[:, 2], index[:, 1], index[:, 0]]
         middle = float(np.median(values))
         noise = 1.4826 * float(np.median(np.abs(values - middle)))
-        return middle, noise, float(np.mean(values >= self.brightest))
+        clipped = float(np.mean(values >= self.brightest))
+        return middle, noise, clipped, float(np.quantile(values, 0.05))
+
+    @cached_property
+    def is_mask(self) -> bool:
+        """Whether nearly all voxels have one of two values: a segmented image, not a CT."""
+        ends = (self.voxels == self.voxels.min()) | (self.voxels == self.brightest)
+        return bool(np.mean(ends) > 0.99)
 
     @cached_property
     def brightest(self) -> float:

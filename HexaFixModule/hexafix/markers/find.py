@@ -138,7 +138,7 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
     fitted = rays.radius_mm if model is None or clipped else model.radius_mm
     reasons = _shape(volume, rays, fitted, radius)
     reasons += [
-        *predicates.model_failures(model, rays),
+        *predicates.model_failures(model, rays, thick=thick),
         *predicates.stem_failures(crop, rays, radius),
     ]
     if reasons:

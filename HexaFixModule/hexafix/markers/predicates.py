@@ -21,12 +21,14 @@ CLIPPED_GROWTH_MM = 0.75
 """How much larger a ball looks when its voxels are clipped."""
 CLIPPED_CORE = 0.02
 """Share of clipped voxels in the core from which a ball counts as clipped."""
-ROUGHNESS_MM = 0.135
-"""RMS distance of the edges from the sphere, at voxels up to 1 mm."""
+ROUGHNESS_MM, MASK_ROUGHNESS_MM = 0.09, 0.135
+"""RMS distance of the edges from the sphere, at voxels up to 1 mm; the second in masks."""
 EDGE_SHARE = 0.80
 """Share of the directions left that have a sound edge on the sphere."""
 CUT_SHARE = 0.60
 """Share of directions hidden by metal beyond which a ball is not judged."""
+UNIFORMITY = 0.15
+"""Median minus 5th percentile of the core, over the contrast, the noise apart."""
 HOMOGENEITY = 0.12
 """RMS of the model's residual over the contrast."""
 STEM_SHELLS_MM = (0.9, 2.0, 3.5)
@@ -85,7 +87,7 @@ def shape_failures(
     high += CLIPPED_GROWTH_MM if rays.clipped_share > CLIPPED_CORE else 0.0
     if not low <= fitted_mm <= high:
         yield f"radius: {fitted_mm:.2f} mm, limit {low:.2f} to {high:.2f} mm"
-    rough = slack * ROUGHNESS_MM * max(1.0, thickest)
+    rough = slack * (MASK_ROUGHNESS_MM if rays.is_mask else ROUGHNESS_MM) * max(1.0, thickest)
     if rays.rms_mm > rough:
         yield f"sphericity: surface RMS {rays.rms_mm:.3f} mm, limit {rough:.3f} mm"
     least = EDGE_SHARE / slack
@@ -95,11 +97,17 @@ def shape_failures(
         yield f"hidden: {rays.cut_share:.0%} of the surface by metal, limit {CUT_SHARE:.0%}"
 
 
-def model_failures(model: ModelFit | None, rays: RayFit) -> Iterator[str]:
-    """Reasons of the blurred-ball model."""
+def model_failures(model: ModelFit | None, rays: RayFit, *, thick: bool) -> Iterator[str]:
+    """Reasons of brightness: the core's uniformity and the blurred-ball model.
+
+    A clipped ball in thick slices may have too few voxels left for the model, and is let pass.
+    """
     contrast = rays.core_hu - rays.outside_hu
+    limit = UNIFORMITY * contrast + 1.65 * rays.core_noise_hu
+    if rays.core_hu - rays.core_low_hu > limit:
+        yield f"core: {rays.core_hu - rays.core_low_hu:.0f} HU uneven, limit {limit:.0f} HU"
     if model is None:
-        if rays.clipped_share <= CLIPPED_CORE:
+        if not thick or rays.clipped_share <= CLIPPED_CORE:
             yield "model: the blurred ball does not fit"
         return
     noise = rays.core_noise_hu

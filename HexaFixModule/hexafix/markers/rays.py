@@ -66,6 +66,10 @@ class RayFit:
         Robust standard deviation of the HU inside.
     clipped_share : float
         Share of the core at the greatest value of the crop.
+    core_low_hu : float
+        5th percentile inside.
+    is_mask : bool
+        Whether the image is segmented, not a CT: its surfaces are stairs.
     """
 
     center_mm: NDArray[np.float64]
@@ -82,6 +86,8 @@ class RayFit:
     shell_hu: NDArray[np.float64]
     core_noise_hu: float
     clipped_share: float
+    core_low_hu: float
+    is_mask: bool
 
 
 def half_sample_mode(values: NDArray[np.float64]) -> float:
@@ -134,7 +140,7 @@ def _one_pass(
     distance = radius + STEP_MM * np.arange(-half, half + 1)
     distance = np.asarray(distance[distance > 0.1 * radius], float)
     profile = crop.sample(center + directions[:, None, :] * distance[:, None])
-    core_hu, core_noise, clipped = crop.core(center, 0.6 * nominal)
+    core_hu, core_noise, clipped, core_low = crop.core(center, 0.6 * nominal)
     away = nominal + SHELL_MM[:, None, None]
     shell = crop.sample(center + directions * away, order=1).mean(axis=0)
     outside = half_sample_mode(shell)
@@ -160,6 +166,8 @@ def _one_pass(
         shell_hu=shell,
         core_noise_hu=core_noise,
         clipped_share=clipped,
+        core_low_hu=core_low,
+        is_mask=crop.is_mask,
     )
 
 

@@ -18,11 +18,13 @@ from hexafix.markers.rays import DIRECTIONS, RayFit
 
 TERMS = ("normal matrix", "lobes of degree 3", "degree 2", "apart", "residual", "floor")
 """What the variance of one axis is the weighted sum of; see `variance_terms`."""
-RAY_WEIGHTS = (0.5342, 2.0058, 0.0487, 0.2589, 1.1934, 0.0759)
-"""Made by ``python -m hexafix.benchmark.ball_sigma``."""
-MODEL_WEIGHTS = (1.0, 0.0, 0.0, 0.3, 1.0, 1.0)
-"""The same for centres of the model fit, slices above 2 mm: ``… ball_sigma --thick``."""
+RAY_WEIGHTS = (0.0, 2.3844, 0.0, 0.2756, 1.4706, 0.0)
+"""Made by ``python -m hexafix.benchmark.ball_sigma 480``."""
+MODEL_WEIGHTS = (5.7697, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""The same for centres of the model fit, slices above 2 mm: ``… --thick 160``."""
 FLOOR_MM = 0.001
+ROUND_SHARE = 0.5
+"""How far the covariance is a sphere; for the rest it has the normal matrix's shape."""
 
 
 def variance_terms(rays: RayFit, model: ModelFit | None, *, by_model: bool) -> NDArray[np.float64]:
@@ -46,9 +48,10 @@ def centre_covariance(
 ) -> NDArray[np.float64]:
     """Covariance of the centre, LPS mm², shape (3, 3); arguments as in `variance_terms`."""
     weights = np.array(MODEL_WEIGHTS if by_model else RAY_WEIGHTS)
-    terms = weights * variance_terms(rays, model, by_model=by_model)
+    variance = max(float(weights @ variance_terms(rays, model, by_model=by_model)), FLOOR_MM**2)
     formal = _formal(rays, model, by_model=by_model)
-    covariance = weights[0] * formal + terms[1:].sum() * np.eye(3)
+    shape = 3.0 * formal / np.trace(formal)
+    covariance = variance * (ROUND_SHARE * np.eye(3) + (1.0 - ROUND_SHARE) * shape)
     return 0.5 * (covariance + covariance.T)
 
 
