@@ -66,3 +66,20 @@ def test_thin_wires_and_plates_give_no_candidates_at_all(workbench):
     found = find_balls(bench.volume(), ball_diameter_mm=10.0)
     assert found.balls == ()
     assert found.rejected == ()
+
+
+def test_a_ball_that_is_uneven_inside_is_rejected_for_its_core(workbench):
+    bench = workbench(5)
+    bench.ball((0.0, 0.0, 0.0))
+    inside = np.linalg.norm(bench.points, axis=-1) < 3.2
+    bench.hu[inside & (bench.points[..., 0] > 1.2)] = 1200.0
+    found = find_balls(bench.volume(), ball_diameter_mm=10.0)
+    assert found.balls == ()
+    assert "core: " in reasons_at(found, bench.lps((0.0, 0.0, 0.0)))
+
+
+def test_a_clipped_round_ended_bolt_is_no_ball(workbench):
+    bench = workbench(6)
+    bench.ball((0.0, 0.0, 0.0), hu=8000.0)
+    bench.rod((0.0, 0.0, 0.0), (8.0, 0.0, 0.0), 10.0, 8000.0)
+    assert find_balls(bench.volume(), ball_diameter_mm=10.0).balls == ()
