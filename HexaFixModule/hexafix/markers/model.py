@@ -89,8 +89,7 @@ def fit_model(
             linear = _step(columns, values, tukey)[0]
         residual = values - columns @ linear
         if step >= 2:
-            scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
-            tukey = np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
+            tukey = _tukey(residual)
         rise = basis[:, :4] @ linear[:4] - basis @ linear[4:]
         jacobian = np.hstack([slope[:, free] * rise[:, None], columns])
         change, normal = _step(jacobian, residual, tukey)
@@ -103,16 +102,17 @@ def fit_model(
         return None
     if np.linalg.norm(state[:3]) > 0.5 * radius_mm:
         return None
-    rms = float(np.sqrt(np.sum(tukey * residual**2) / max(1.0, np.sum(tukey))))
-    return ModelFit(
-        center_mm=np.asarray(start_mm) + state[:3],
-        radius_mm=float(state[3]),
-        sigma_plane_mm=float(state[4]),
-        sigma_slice_mm=float(state[5]),
-        contrast_hu=float(np.median(rise)),
-        rms_hu=rms,
-        covariance_mm2=np.asarray(rms**2 * np.linalg.inv(normal)[:3, :3], float),
-    )
+    square = float(np.sum(tukey * residual**2) / max(1.0, np.sum(tukey)))
+    covariance = np.asarray(square * np.linalg.inv(normal)[:3, :3], float)
+    center, (radius, plane, along) = np.asarray(start_mm) + state[:3], state[3:].tolist()
+    contrast = float(np.median(rise))
+    return ModelFit(center, radius, plane, along, contrast, square**0.5, covariance)
+
+
+def _tukey(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Tukey's weights about the residuals' own scale."""
+    scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-6
+    return np.maximum(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0) ** 2
 
 
 def _band(
