@@ -265,9 +265,11 @@ def _build(
     document = json.loads(model.model_dump_json())
     document["fixator"] = definition
     document["image"] = {"path": None, "series_instance_uid": None}
-    numbering = model.numbering and MappingProxyType(
-        {int(number): np.array(point, float) for number, point in model.numbering.items()}
-    )
+    numbering = None
+    if model.numbering:
+        numbering = MappingProxyType(
+            {int(number): np.array(point, float) for number, point in model.numbering.items()}
+        )
     canonical = json.dumps(definition, sort_keys=True, separators=(",", ":"))
     return Case(
         case_id=model.case_id,
@@ -278,7 +280,7 @@ def _build(
         ball_diameter_mm=model.markers.ball_diameter_mm,
         proximal=_layout(model.markers.proximal),
         distal=_layout(model.markers.distal),
-        numbering=numbering or None,
+        numbering=numbering,
         strut_readings_mm=None
         if model.strut_readings_mm is None
         else np.array(model.strut_readings_mm, float),

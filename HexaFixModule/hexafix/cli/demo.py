@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from hexafix.errors import InputError
 from hexafix.progress import Progress
@@ -13,7 +13,7 @@ def run_phantom(
     out: Path,
     *,
     seed: int,
-    image_format: str,
+    image_format: Literal["dicom", "nrrd"],
     options: dict[str, Any],
     progress: Progress,
 ) -> dict[str, Any]:

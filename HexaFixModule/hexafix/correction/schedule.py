@@ -148,11 +148,13 @@ def make_schedule(
             hazard="H31",
             next_step="plan the correction in two stages, or mount the frame otherwise",
         )
-    for _ in range(MORE_DAYS + 1):
-        schedule = _rounded(path, fixator, rules, readings, pace, stroke)
-        if schedule.realised_max_mm_per_day <= rules.max_rate_mm_per_day + rules.strut_step_mm:
+    most = rules.max_rate_mm_per_day + rules.strut_step_mm
+    schedule = _rounded(path, fixator, rules, readings, pace, stroke)
+    for _ in range(MORE_DAYS):
+        if schedule.realised_max_mm_per_day <= most:
             break
         pace = _one_more_day(pace)
+        schedule = _rounded(path, fixator, rules, readings, pace, stroke)
     return schedule
 
 

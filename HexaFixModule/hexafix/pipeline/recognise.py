@@ -132,10 +132,14 @@ def recognise_case(case: Case, *, progress: Progress = silent) -> dict[str, Any]
 
 
 def _number(case: Case, balls: BallSet) -> Numbering:
-    layouts = {"proximal": case.proximal, "distal": case.distal}
+    centers = balls.centers_mm
     if case.numbering is not None:
-        return check_user_numbering(dict(case.numbering), balls.centers_mm, **layouts)
-    return number_balls(balls.centers_mm, **layouts, judge=_strut_judge(case))
+        return check_user_numbering(
+            dict(case.numbering), centers, proximal=case.proximal, distal=case.distal
+        )
+    return number_balls(
+        centers, proximal=case.proximal, distal=case.distal, judge=_strut_judge(case)
+    )
 
 
 def _strut_judge(case: Case) -> Callable[[RingPose, RingPose], float] | None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexafix.verify import rigid
 from hexafix.verify.check import Check, largest, stated
+from hexafix.verify.rigid import Matrix
 from hexafix.verify.target import target
 
 POSE_MM, POSE_DEG = 1e-4, 1e-5
@@ -101,7 +101,7 @@ def recompute(document: dict[str, Any]) -> Recomputed:
     return Recomputed(tuple(checks), away, turned)
 
 
-def _ring(document: dict[str, Any], side: str) -> NDArray[np.float64]:
+def _ring(document: dict[str, Any], side: str) -> Matrix:
     markers = document["case"]["markers"][side]
     balls = {ball["number"]: ball for ball in document["balls"]}
     chosen = [balls[marker["number"]] for marker in markers]
@@ -112,7 +112,7 @@ def _ring(document: dict[str, Any], side: str) -> NDArray[np.float64]:
     )
 
 
-def _pose_checks(name: str, pose: NDArray[np.float64], entry: dict[str, Any]) -> list[Check]:
+def _pose_checks(name: str, pose: Matrix, entry: dict[str, Any]) -> list[Check]:
     """A recomputed pose against the matrix, the position and the angles that the plan states."""
     matrix = np.array(entry.get("matrix_lps", entry.get("matrix")), float)
     turned = (rigid.angles_deg(pose) - entry["angles_deg"] + 180.0) % 360.0 - 180.0
@@ -125,20 +125,22 @@ def _pose_checks(name: str, pose: NDArray[np.float64], entry: dict[str, Any]) ->
 
 
 def _compensated(
-    document: dict[str, Any], rings: dict[str, NDArray[np.float64]], struts: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    document: dict[str, Any], rings: dict[str, Matrix], struts: Matrix
+) -> tuple[Matrix, Matrix]:
     """The ring poses that the plan was made with."""
     if document["correction"]["compensation"] != "fused":
         return rings["proximal"], rings["distal"]
     to_rad = np.array([1.0, 1.0, 1.0, *np.radians(np.ones(3))])
-    covariances = [
+    of_proximal, of_distal = (
         np.array(document["rings"][side]["covariance"], float) * np.outer(to_rad, to_rad)
         for side in ("proximal", "distal")
-    ]
+    )
     resolution = document["mechanism"]["from_struts"]["reading_resolution_mm"]
-    covariances.append(rigid.reading_covariance(struts, document["case"]["fixator"], resolution))
+    of_struts = rigid.reading_covariance(struts, document["case"]["fixator"], resolution)
     return rigid.fuse(
-        rings=(rings["proximal"], rings["distal"]), struts=struts, covariances=tuple(covariances)
+        rings=(rings["proximal"], rings["distal"]),
+        struts=struts,
+        covariances=(of_proximal, of_distal, of_struts),
     )
 
 
@@ -146,9 +148,9 @@ def _schedule_checks(
     document: dict[str, Any],
     fixator: dict[str, Any],
     offset: float,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    planned: tuple[NDArray[np.float64], NDArray[np.float64]],
+    start: Matrix,
+    goal: Matrix,
+    planned: tuple[Matrix, Matrix],
 ) -> list[Check]:
     """Rows against the path, the strut's steps, the stroke, the rates and the calendar."""
     schedule = document["schedule"]
@@ -176,8 +178,8 @@ def _schedule_checks(
 def _rate_checks(
     document: dict[str, Any],
     fixator: dict[str, Any],
-    poses: NDArray[np.float64],
-    planned: tuple[NDArray[np.float64], NDArray[np.float64]],
+    poses: Matrix,
+    planned: tuple[Matrix, Matrix],
 ) -> list[Check]:
     """Speeds of the watched points along the path, summed over fine chords."""
     rules, schedule = document["case"]["schedule"], document["schedule"]

@@ -10,7 +10,9 @@ from scipy.linalg import expm, logm
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-Matrix = NDArray[np.float64]
+Matrix = NDArray[np.floating[Any]]
+"""Arrays of this room; shapes stand in the docstrings."""
+
 INSTALLATION_SIGMA_MM = 0.4 / 6
 """Installation error of a marker per axis. Source: Section 4.3."""
 
@@ -26,17 +28,16 @@ def distance_mm(one: Matrix, other: Matrix) -> float:
     return float(np.linalg.norm(one[:3, 3] - other[:3, 3]))
 
 
-def angles_deg(pose: Matrix) -> NDArray[np.float64]:
+def angles_deg(pose: Matrix) -> Matrix:
     """X-Y-Z fixed angles of a 4×4 pose, degrees, by scipy."""
     return Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True)
 
 
-def layout_points(markers: list[dict[str, float]]) -> NDArray[np.float64]:
+def layout_points(markers: list[dict[str, float]]) -> Matrix:
     """Marker places in the ring frame, shape (N, 3), mm, as complex numbers in the plane."""
-    place = np.array([m["radius_mm"] for m in markers]) * np.exp(
-        1j * np.radians([m["sweep_deg"] for m in markers])
-    )
-    return np.stack([place.real, place.imag, [m["height_mm"] for m in markers]], axis=-1)
+    place = [m["radius_mm"] * np.exp(1j * np.radians(m["sweep_deg"])) for m in markers]
+    heights = [m["height_mm"] for m in markers]
+    return np.stack([np.real(place), np.imag(place), heights], axis=-1)
 
 
 def ring_pose(places: Matrix, centers: Matrix, covariances: Matrix) -> Matrix:
@@ -56,7 +57,7 @@ def ring_pose(places: Matrix, centers: Matrix, covariances: Matrix) -> Matrix:
     middle_place, middle = places.mean(axis=0), centers.mean(axis=0)
     start, _ = Rotation.align_vectors(centers - middle, places - middle_place)
 
-    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(x: Matrix) -> Matrix:
         turn = Rotation.from_rotvec(x[3:]) * start
         away = turn.apply(places - middle_place) + middle + x[:3] - centers
         return np.einsum("nij,nj->ni", whiten, away).ravel()
@@ -70,14 +71,14 @@ def ring_pose(places: Matrix, centers: Matrix, covariances: Matrix) -> Matrix:
     return pose
 
 
-def strut_vectors(pose: Matrix, fixator: dict[str, Any]) -> NDArray[np.float64]:
+def strut_vectors(pose: Matrix, fixator: dict[str, Any]) -> Matrix:
     """From b_l to a_l in {B}, shape (6, 3), mm, by homogeneous coordinates."""
     ones = np.ones((6, 1))
     a = np.hstack([np.array(fixator["proximal"]["joints_mm"], float), ones]) @ pose.T
     return a[:, :3] - np.array(fixator["distal"]["joints_mm"], float)
 
 
-def strut_lengths(pose: Matrix, fixator: dict[str, Any]) -> NDArray[np.float64]:
+def strut_lengths(pose: Matrix, fixator: dict[str, Any]) -> Matrix:
     """Strut lengths of a 4×4 pose {A} in {B}, shape (6,), mm."""
     return np.sqrt(np.sum(np.square(strut_vectors(pose, fixator)), axis=1))
 
@@ -85,7 +86,7 @@ def strut_lengths(pose: Matrix, fixator: dict[str, Any]) -> NDArray[np.float64]:
 def forward(lengths: Matrix, fixator: dict[str, Any], start: Matrix) -> Matrix:
     """Mechanism pose of six lengths by least squares on X-Y-Z angles (Eq. 30 as printed)."""
 
-    def pose_of(x: NDArray[np.float64]) -> Matrix:
+    def pose_of(x: Matrix) -> Matrix:
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_euler("xyz", x[3:]).as_matrix()
         pose[:3, 3] = x[:3]
@@ -103,7 +104,7 @@ def forward(lengths: Matrix, fixator: dict[str, Any], start: Matrix) -> Matrix:
     return pose_of(fit.x)
 
 
-def along(start: Matrix, end: Matrix, s: NDArray[np.float64]) -> Matrix:
+def along(start: Matrix, end: Matrix, s: Matrix) -> Matrix:
     """Poses at s, shape (S,), in [0, 1] on the screw from start to end, shape (S, 4, 4).
 
     By matrix logarithm and exponential.
@@ -116,7 +117,7 @@ def reading_covariance(pose: Matrix, fixator: dict[str, Any], resolution_mm: flo
     """Covariance of ξ in X exp(ξ) from readings good to half a resolution, by differences."""
     step = 1e-5
 
-    def moved(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    def moved(xi: Matrix) -> Matrix:
         return strut_lengths(pose @ exponential(xi), fixator)
 
     slopes = [(moved(xi) - moved(-xi)) / (2 * step) for xi in step * np.eye(6)]
@@ -124,7 +125,7 @@ def reading_covariance(pose: Matrix, fixator: dict[str, Any], resolution_mm: flo
     return resolution_mm**2 / 12.0 * inverse @ inverse.T
 
 
-def exponential(xi: NDArray[np.float64]) -> Matrix:
+def exponential(xi: Matrix) -> Matrix:
     """4×4 matrix of a twist (mm, rad), by scipy's `RigidTransform`."""
     return RigidTransform.from_exp_coords(np.concatenate([xi[3:], xi[:3]])).as_matrix()
 
@@ -146,7 +147,7 @@ def fuse(
     proximal, distal = rings
     whiten = [np.linalg.inv(np.linalg.cholesky(c)) for c in covariances]
 
-    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(x: Matrix) -> Matrix:
         moved = np.linalg.solve(proximal, distal @ exponential(x[:6]) @ struts @ exponential(x[6:]))
         coords = RigidTransform.from_matrix(moved).as_exp_coords()
         xi_a = np.concatenate([coords[3:], coords[:3]])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hexafix.verify.rigid import Matrix, angles_deg
@@ -111,7 +110,7 @@ def _deformity(given: dict[str, Any], side: str) -> Matrix:
     return np.linalg.inv(displaced)
 
 
-def _smallest_turn(start: NDArray[np.float64], end: NDArray[np.float64]) -> Rotation:
+def _smallest_turn(start: Matrix, end: Matrix) -> Rotation:
     """The rotation by the smallest angle that takes one direction to another, by half vectors."""
     end = end / np.linalg.norm(end)
     half = start + end
