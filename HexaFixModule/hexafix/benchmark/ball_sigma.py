@@ -18,9 +18,8 @@ from hexafix.markers.crop import Crop
 from hexafix.markers.directions import sphere_directions
 from hexafix.markers.find import SURROUND_MM, THICK_SLICES_MM
 from hexafix.markers.model import fit_model
-from hexafix.markers.predicates import CLIPPED_CORE
 from hexafix.markers.rays import DIRECTIONS, fine_fit, rough_fit
-from hexafix.markers.uncertainty import TERMS, variance_terms
+from hexafix.markers.uncertainty import CLIPPED_CORE, TERMS, variance_terms
 from hexafix.phantom.local import Scene, render_ball
 
 MORE = (

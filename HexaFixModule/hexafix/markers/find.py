@@ -16,7 +16,7 @@ from hexafix.markers.directions import sphere_directions
 from hexafix.markers.model import ModelFit, fit_model
 from hexafix.markers.rays import DIRECTIONS, RayFit, fine_fit, rough_fit
 from hexafix.markers.search import candidate_centers
-from hexafix.markers.uncertainty import centre_covariance
+from hexafix.markers.uncertainty import CLIPPED_CORE, centre_covariance
 from hexafix.progress import Progress, silent
 
 THICK_SLICES_MM = 2.0
@@ -125,7 +125,7 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
     reason = predicates.border_failure(volume, rays.center_mm, radius)
     if reason is not None:
         return Rejected(rays.center_mm, reason)
-    clipped = rays.clipped_share > predicates.CLIPPED_CORE
+    clipped = rays.clipped_share > CLIPPED_CORE
     thick = float(volume.spacing_mm.max()) > THICK_SLICES_MM
     model = fit_model(
         crop,

@@ -12,6 +12,7 @@ from hexafix.markers.crop import Crop
 from hexafix.markers.directions import neighbour_average, sphere_directions
 from hexafix.markers.model import ModelFit
 from hexafix.markers.rays import DIRECTIONS, RayFit
+from hexafix.markers.uncertainty import CLIPPED_CORE
 
 BORDER_MM = 0.75
 """The ball's surface lies at least this far inside the volume (and at least a voxel)."""
@@ -19,8 +20,6 @@ RADIUS_MM = 0.15
 """Fitted radius against the nominal one, at voxels up to 0.7 mm."""
 CLIPPED_GROWTH_MM = 0.75
 """How much larger a ball looks when its voxels are clipped."""
-CLIPPED_CORE = 0.02
-"""Share of clipped voxels in the core from which a ball counts as clipped."""
 ROUGHNESS_MM, MASK_ROUGHNESS_MM = 0.09, 0.135
 """RMS distance of the edges from the sphere, at voxels up to 1 mm; the second in masks."""
 EDGE_SHARE = 0.80

@@ -23,6 +23,8 @@ RAY_WEIGHTS = (0.0, 2.3844, 0.0, 0.2756, 1.4706, 0.0)
 MODEL_WEIGHTS = (5.7697, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The same for centres of the model fit, slices above 2 mm: ``… --thick 160``."""
 FLOOR_MM = 0.001
+CLIPPED_CORE = 0.02
+"""Share of clipped voxels in the core from which a ball counts as clipped."""
 ROUND_SHARE = 0.5
 """How far the covariance is a sphere; for the rest it has the normal matrix's shape."""
 
@@ -36,9 +38,16 @@ def variance_terms(rays: RayFit, model: ModelFit | None, *, by_model: bool) -> N
     model : ModelFit or None
     by_model : bool
         Whether the model gives the centre.
+
+    Notes
+    -----
+    How far rays and model lie apart says nothing where the model sees only half of the ball's
+    edge, as with a clipped one.
     """
     even, odd = _lobes(rays)
-    apart = 0.0 if model is None else float(np.sum((model.center_mm - rays.center_mm) ** 2)) / 3.0
+    apart = 0.0
+    if model is not None and rays.clipped_share <= CLIPPED_CORE:
+        apart = float(np.sum((model.center_mm - rays.center_mm) ** 2)) / 3.0
     formal = np.trace(_formal(rays, model, by_model=by_model)) / 3.0
     return np.array([formal, odd, even, apart, rays.rms_mm**2 / 100.0, FLOOR_MM**2])
 
