@@ -56,7 +56,7 @@ LIBRARIES = {
     "gates": {"numpy"},
     "export": set(),
     "report": {"numpy", "scipy", "typst", "vtkmodules"},
-    "verify": {"numpy", "scipy", "pypdf"},
+    "verify": {"numpy", "scipy", "pypdfium2"},
     "pipeline": {"numpy", "scipy"},
     "cli": {"cyclopts", "rich"},
     "benchmark": {"numpy", "scipy", "SimpleITK", "skimage", "vtkmodules", "psutil"},

@@ -84,6 +84,29 @@ def plan_correction(
     Refused
         If a gate is red or a step refuses.
     """
+    recognised = recognise_checked(
+        case, volume=volume, accept_relaxed_layout=accept_relaxed_layout, progress=progress
+    )
+    progress("plan the correction", 0.0)
+    plan = plan_recognised(case, recognised, accept_relaxed_layout=accept_relaxed_layout)
+    progress("plan the correction", 1.0)
+    return plan
+
+
+def recognise_checked(
+    case: Case,
+    *,
+    volume: Volume | None = None,
+    accept_relaxed_layout: bool = False,
+    progress: Progress = silent,
+) -> Recognised:
+    """The first half of `plan_correction`: the layout's rules, the image, the poses, their gates.
+
+    Raises
+    ------
+    Refused
+        If a layout breaks its rules (then the image is not even read) or a gate is red.
+    """
     layout = check_layouts(case.proximal, case.distal)
     faults = layout_faults(layout, accept_relaxed=accept_relaxed_layout, numbering_settled=True)
     if faults:
@@ -92,14 +115,19 @@ def plan_correction(
         volume = read_case_image(case, progress=progress)
     recognised = recognise(case, volume, progress=progress)
     gates.decide(recognised.gates)
-    progress("plan the correction", 0.0)
-    plan = _plan(case, recognised, accept_relaxed_layout=accept_relaxed_layout)
-    progress("plan the correction", 1.0)
-    return plan
+    return recognised
 
 
-def _plan(case: Case, recognised: Recognised, *, accept_relaxed_layout: bool) -> Plan:
-    """The steps after recognition; `plan_correction` has checked that the case is plannable."""
+def plan_recognised(
+    case: Case, recognised: Recognised, *, accept_relaxed_layout: bool = False
+) -> Plan:
+    """The second half of `plan_correction`: struts, compensation, target, schedule, their gates.
+
+    Raises
+    ------
+    Refused
+        If a gate is red or a step refuses.
+    """
     if case.correction is None or case.schedule is None or case.strut_readings_mm is None:
         raise HexaFixError.of("not-plannable", "a plan needs readings, correction and schedule")
     struts = weigh_struts(case, recognised)

@@ -22,7 +22,7 @@ NOTICE = (
     "Research software. Not a medical device. Not to be followed unless a surgeon has checked and "
     "approved it."
 )
-LIBRARIES = ("numpy", "scipy", "SimpleITK", "pydicom", "pydantic", "typst", "pypdf")
+LIBRARIES = ("numpy", "scipy", "SimpleITK", "pydicom", "pydantic", "typst", "pypdfium2")
 LEFT = {
     "fused": "image and readings were weighed by their uncertainties and both ring poses corrected",
     "additive": "the difference of the pose vectors was subtracted from the target (Eq. 32)",

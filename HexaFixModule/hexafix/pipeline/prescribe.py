@@ -11,7 +11,9 @@ from hexafix.case import Case
 from hexafix.errors import HexaFixError
 from hexafix.imaging import Volume
 from hexafix.pipeline import plan_document
-from hexafix.pipeline.plan import Plan, plan_correction
+from hexafix.pipeline.document import recognition
+from hexafix.pipeline.plan import plan_recognised, recognise_checked
+from hexafix.pipeline.recognise import Recognised
 from hexafix.progress import Progress, silent
 from hexafix.report.pdf import prescription_pdf
 from hexafix.report.picture import SceneRenderer
@@ -50,14 +52,15 @@ def plan_and_export(
     """
     export.check_target(folder)
     with SceneRenderer() as renderer:
-        plan = plan_correction(
-            case,
-            volume=volume,
-            accept_relaxed_layout=accept_relaxed_layout,
-            progress=progress,
+        recognised = recognise_checked(
+            case, volume=volume, accept_relaxed_layout=accept_relaxed_layout, progress=progress
         )
+        # the picture is rendered by another process while the correction is planned
+        renderer.show(_scene(case, recognised))
+        progress("plan the correction", 0.0)
+        plan = plan_recognised(case, recognised, accept_relaxed_layout=accept_relaxed_layout)
+        progress("plan the correction", 1.0)
         document = plan_document.plan(plan)
-        renderer.show(_scene(document, plan))
         progress("recompute by another road", 0.0)
         document["gates"] += [gate.as_json() for gate in _recomputed(document)]
         progress("recompute by another road", 1.0)
@@ -86,10 +89,10 @@ def json_bytes(document: dict[str, Any]) -> bytes:
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
-def _scene(document: dict[str, Any], plan: Plan) -> SceneGeometry:
-    bare = SceneGeometry.from_document(document)
-    bone = sample_bone(plan.recognised.volume, bare)
-    return SceneGeometry.from_document(document, bone=bone)
+def _scene(case: Case, recognised: Recognised) -> SceneGeometry:
+    seen = {**recognition(case, recognised), "case": dict(case.document)}
+    bone = sample_bone(recognised.volume, SceneGeometry.from_document(seen))
+    return SceneGeometry.from_document(seen, bone=bone)
 
 
 def _recomputed(document: dict[str, Any]) -> tuple[gates.Gate, ...]:

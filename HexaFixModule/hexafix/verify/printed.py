@@ -63,13 +63,13 @@ def _markup_differences(document: dict[str, Any], content: bytes) -> list[str]:
 
 
 def _pdf_differences(document: dict[str, Any], content: bytes) -> list[str]:
-    from pypdf import PdfReader
-    from pypdf.errors import PyPdfError
+    import pypdfium2
 
     try:
-        pages = [page.extract_text() for page in PdfReader(io.BytesIO(content)).pages]
-    except (PyPdfError, ValueError, KeyError) as error:
-        return [f"prescription.pdf: cannot be read back ({type(error).__name__})"]
+        with pypdfium2.PdfDocument(content) as pdf:
+            pages = [page.get_textpage().get_text_range() for page in pdf]
+    except pypdfium2.PdfiumError as error:
+        return [f"prescription.pdf: cannot be read back ({error})"]
     text = "\n".join(pages)
     wrong = [
         f"prescription.pdf: not printed as planned: {' '.join(row)}"
