@@ -216,10 +216,10 @@ def _along_path(
     Sequences are tried with a growing price on the two ends of every day that is too long; the
     one with the shortest longest day counts.
     """
-    loss = exact.cost**EVENNESS
+    loss, barred = exact.cost**EVENNESS, _turned_back(steps, in_steps)
     shortest, found = np.inf, exact.cost.argmin(axis=1)
     for _ in range(TRIES):
-        best = _choose(loss, steps, in_steps)
+        best = _choose(loss, barred)
         way = ways.of(best)
         longest = float(way.max(initial=0.0))
         if longest < shortest:
@@ -232,29 +232,40 @@ def _along_path(
     return found
 
 
-def _choose(
-    loss: NDArray[np.float64], steps: NDArray[np.int64], in_steps: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _turned_back(
+    steps: NDArray[np.int64], in_steps: NDArray[np.float64]
+) -> list[NDArray[np.bool_]]:
+    """For each row, which pairs (choice before, choice now) turn a strut back, 64 × 64 each.
+
+    Today's row is as it was read, whatever is chosen there.
+    """
+    before: NDArray[np.floating] = np.broadcast_to(in_steps[0], steps[0].shape)
+    barred = [np.zeros((len(steps[0]), len(steps[0])), bool)]
+    for row in range(1, len(steps)):
+        direction = in_steps[row] - in_steps[row - 1]
+        moved = (steps[row][None, :, :] - before[:, None, :]) * direction
+        barred.append(np.any(moved < -1e-9, axis=-1))
+        before = steps[row].astype(float)
+    return barred
+
+
+def _choose(loss: NDArray[np.float64], barred: list[NDArray[np.bool_]]) -> NDArray[np.int64]:
     """The choices along a path that turn no strut back with the least sum of losses, shape (S,).
 
     By dynamic programming over all sequences in which every strut moves only where the path moves
     it. Such a sequence always exists: the floor of a strut that becomes shorter, the ceil of one
     that becomes longer.
     """
-    total = loss[0] * 0.0
-    came_from = np.zeros((len(steps), steps.shape[1]), np.int64)
-    # today's row is as it was read, whatever is chosen there
-    before = np.broadcast_to(in_steps[0], steps[0].shape)
-    for row in range(1, len(steps)):
-        direction = in_steps[row] - in_steps[row - 1]
-        moved = (steps[row][None, :, :] - before[:, None, :]) * direction
-        arrive = np.where(np.any(moved < -1e-9, axis=-1), np.inf, total[:, None])
+    price = [np.where(bar, np.inf, 0.0) for bar in barred]
+    total = np.zeros(loss.shape[1])
+    came_from = np.zeros(loss.shape, np.int64)
+    for row in range(1, len(loss)):
+        arrive = price[row] + total[:, None]
         came_from[row] = arrive.argmin(axis=0)
-        total = arrive[came_from[row], np.arange(arrive.shape[1])] + loss[row]
-        before = steps[row]
-    best = np.zeros(len(steps), np.int64)
+        total = arrive.min(axis=0) + loss[row]
+    best = np.zeros(len(loss), np.int64)
     best[-1] = total.argmin()
-    for row in range(len(steps) - 1, 0, -1):
+    for row in range(len(loss) - 1, 0, -1):
         best[row - 1] = came_from[row, best[row]]
     return best
 

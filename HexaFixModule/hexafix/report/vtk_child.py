@@ -222,16 +222,16 @@ def _aim(renderer: Any, center: Any, toward: Any, up: Any, height_mm: float) -> 
     camera.SetClippingRange(1.0, 2500.0)
 
 
-def render(folder: Path, v: Any) -> int:
-    """Write ``view-<n>.png`` for each view of the scene in `folder`; returns the exit code."""
-    import numpy as np
+def _window(v: Any) -> tuple[Any, Any] | None:
+    """An offscreen window and its lit renderer, warmed up; None if it is not the one asked for.
 
-    with np.load(folder / "scene.npz", allow_pickle=False) as stored:
-        scene = dict(stored)
+    The first picture makes the driver compile its programs. That happens here, while the parent
+    still reads the CT.
+    """
     window = v.vtkRenderWindow()
     wanted = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW")
     if wanted and window.GetClassName() != wanted:
-        return EXIT_NO_WINDOW
+        return None
     window.SetOffScreenRendering(1)
     window.SetMultiSamples(0)
     window.SetAlphaBitPlanes(1)
@@ -240,6 +240,23 @@ def render(folder: Path, v: Any) -> int:
     renderer.UseFXAAOn()
     _light(renderer, v)
     window.AddRenderer(renderer)
+    warm = [_actor(v, _sphere(v, (9.0 * n, 0.0, 0.0), 4.0), BALL, opacity=o)
+            for n, o in enumerate((1.0, 0.7))]  # fmt: skip
+    for actor in warm:
+        renderer.AddActor(actor)
+    window.SetSize(64, 64)
+    window.Render()
+    for actor in warm:
+        renderer.RemoveActor(actor)
+    return window, renderer
+
+
+def render(folder: Path, v: Any, window: Any, renderer: Any) -> int:
+    """Write ``view-<n>.png`` for each view of the scene in `folder`; returns the exit code."""
+    import numpy as np
+
+    with np.load(folder / "scene.npz", allow_pickle=False) as stored:
+        scene = dict(stored)
     for actor in _actors(v, scene):
         renderer.AddActor(actor)
     for number, (axes, size, pixels) in enumerate(
@@ -271,8 +288,11 @@ def main() -> int:
         v = _import_vtk()
     except ImportError:
         return EXIT_NO_VTK
+    made = _window(v)
+    if made is None:
+        return EXIT_NO_WINDOW
     line = sys.stdin.readline().strip()
-    return render(Path(line), v) if line else 0
+    return render(Path(line), v, *made) if line else 0
 
 
 if __name__ == "__main__":
