@@ -19,7 +19,6 @@ from hexafix.report.pdf import prescription_pdf
 from hexafix.report.picture import SceneRenderer
 from hexafix.report.scene import SceneGeometry, sample_bone
 from hexafix.report.tables import markers_mrk_json, schedule_csv
-from hexafix.verify import check_printed, recompute
 
 
 def plan_and_export(
@@ -65,12 +64,17 @@ def plan_and_export(
         document["gates"] += [gate.as_json() for gate in _recomputed(document)]
         progress("recompute by another road", 1.0)
         progress("set the prescription", 0.0)
+        # typst keeps what does not change, so the pages are set before the picture is there
+        prescription_pdf(document)
+        progress("set the prescription", 0.5)
         files = {
             "plan.json": json_bytes(document),
             "schedule.csv": schedule_csv(document),
             "markers.mrk.json": markers_mrk_json(document),
             "prescription.pdf": prescription_pdf(document, pictures=renderer.result()),
         }
+    from hexafix.verify import check_printed
+
     wrong = check_printed(document, files)
     if wrong:
         raise HexaFixError.of(
@@ -97,6 +101,9 @@ def _scene(case: Case, recognised: Recognised) -> SceneGeometry:
 
 def _recomputed(document: dict[str, Any]) -> tuple[gates.Gate, ...]:
     """G9, decided."""
+    # Not at the top: its libraries load while the picture is rendered.
+    from hexafix.verify import recompute
+
     result = recompute(document)
     found = gates.recomputed(result.distance_mm, result.rotation_deg)
     gates.decide(found)

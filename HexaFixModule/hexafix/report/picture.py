@@ -23,7 +23,7 @@ from hexafix.report.words import RING_COLOURS, STRUT_COLOURS
 TIME_LIMIT_S = 30.0
 """Wall clock that the child may take before it is ended."""
 
-PIXELS_PER_MM = 3.0
+PIXELS_PER_MM = 2.4
 """Pixels for a millimetre of the patient: about 250 to the inch on the page."""
 
 OPENGL_WINDOWS: tuple[str | None, ...] = (

@@ -24,7 +24,7 @@ ANATOMY = {
 }
 """Directions of the patient in LPS."""
 
-BONE_VOXEL_MM = 1.6
+BONE_VOXEL_MM = 1.9
 """Voxel pitch that is fine enough for the picture of the bone."""
 
 BONE_MARGIN_MM = 60.0

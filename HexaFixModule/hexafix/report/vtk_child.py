@@ -275,7 +275,7 @@ def render(folder: Path, v: Any, window: Any, renderer: Any) -> int:
         if values.min() == values.max():
             return EXIT_BLANK
         writer = v.vtkPNGWriter()
-        writer.SetCompressionLevel(3)
+        writer.SetCompressionLevel(1)
         writer.SetInputData(shot.GetOutput())
         writer.SetFileName(str(folder / f"view-{number}.png"))
         writer.Write()
