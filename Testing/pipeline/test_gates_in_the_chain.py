@@ -186,6 +186,7 @@ def pose(position_mm, angles_deg=(0, 0, 0)):
         (gates.numbering_unique, (6.0, "layout"), (0.3, "layout")),
         (gates.forward_basin, (1e-9, 20), (np.inf, 20)),
         (gates.well_conditioned, (5.0,), (500.0,)),
+        (gates.realised_rate, (1.4, 1.0, 0.5), (2.1, 1.0, 0.5)),
         (gates.sides_agree, ("left", None), ("left", "R")),
         (gates.sides_agree, ("left", "L"), ("right", "L")),
     ],

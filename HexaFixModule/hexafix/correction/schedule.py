@@ -149,13 +149,14 @@ def make_schedule(
             next_step="plan the correction in two stages, or mount the frame otherwise",
         )
     most = rules.max_rate_mm_per_day + rules.strut_step_mm
-    schedule = _rounded(path, fixator, rules, readings, pace, stroke)
+    shortest = schedule = _rounded(path, fixator, rules, readings, pace, stroke)
     for _ in range(MORE_DAYS):
         if schedule.realised_max_mm_per_day <= most:
-            break
+            return schedule
         pace = _one_more_day(pace)
         schedule = _rounded(path, fixator, rules, readings, pace, stroke)
-    return schedule
+    # where whole steps are coarse for so small a way, more days do not help
+    return schedule if schedule.realised_max_mm_per_day <= most else shortest
 
 
 def _rounded(

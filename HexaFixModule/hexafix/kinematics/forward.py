@@ -131,7 +131,8 @@ def forward_kinematics_batch(
 
 def _checked_lengths(lengths_mm: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     q = np.asarray(lengths_mm, float)
-    if q.shape != shape or not all(0.0 < length < np.inf for length in q.ravel().tolist()):
+    # NaN is neither above 0 nor below infinity
+    if q.shape != shape or (q.size and not (q.min() > 0.0 and q.max() < np.inf)):
         raise InputError.of(
             "strut-lengths",
             "six positive finite strut lengths are needed",

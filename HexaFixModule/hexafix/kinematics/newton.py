@@ -131,8 +131,8 @@ def solve_rows(
     """
     m = len(lengths_mm)
     # the row index comes last inside, so that every operation runs along memory
-    r = np.array(np.broadcast_to(np.asarray(start_rotations, float), (m, 3, 3)))
-    r = np.ascontiguousarray(np.moveaxis(orthonormal(r), 0, -1))
+    r = orthonormal(np.asarray(start_rotations, float))
+    r = np.array(np.moveaxis(np.broadcast_to(r, (m, 3, 3)), 0, -1), order="C")
     p = np.array(np.broadcast_to(np.asarray(start_positions, float), (m, 3)).T)
     q = np.ascontiguousarray(lengths_mm.T)
     iterations, residual = np.zeros(m, np.int64), np.full(m, np.inf)
