@@ -12,6 +12,10 @@ from hexafix.recognition import RING_RMS_LIMIT_MM
 DIAMETER_LIMIT_MM = 0.3
 """G3: blur biases the fitted diameter by less; a slice spacing wrong by 4 % gives more."""
 
+CLIPPED_DIAMETER_LIMIT_MM = 1.0
+"""G3 for balls denser than the scanner's scale: clipping moves their edge out by 0.3 mm or more, so
+that the diameter says little; a wrong scale is then left to G2."""
+
 TILT_LIMIT_DEG = 60.0
 """G5: a ring's axis further than this from the line to the other ring is no fixator on a limb."""
 
@@ -40,8 +44,10 @@ def ring_rms(ring: str, rms_mm: float) -> Gate:
     )
 
 
-def ball_diameters(ring: str, diameters_mm: ArrayLike, nominal_mm: float) -> Gate:
-    """G3: scale of the image, by the balls' known diameter."""
+def ball_diameters(
+    ring: str, diameters_mm: ArrayLike, nominal_mm: float, *, clipped: bool = False
+) -> Gate:
+    """G3: scale of the image, by the balls' known diameter; wider if any ball is clipped."""
     worst = float(np.max(np.abs(np.asarray(diameters_mm, float) - nominal_mm)))
     return at_most(
         "G3",
@@ -49,7 +55,7 @@ def ball_diameters(ring: str, diameters_mm: ArrayLike, nominal_mm: float) -> Gat
         f"ball diameters of the {ring} ring against {nominal_mm:g} mm",
         "H23",
         worst,
-        DIAMETER_LIMIT_MM,
+        CLIPPED_DIAMETER_LIMIT_MM if clipped else DIAMETER_LIMIT_MM,
         "mm",
         good="the balls have the size the case says",
         bad="a ball has another size than the case says: wrong scale or other markers",

@@ -28,6 +28,8 @@ class Ball:
         ``gradient-rays`` or ``model-fit``.
     warnings : tuple of str
         What the user should look at.
+    clipped : bool
+        Whether the scanner clipped the ball's core; its diameter then looks too large (H11).
     """
 
     center_mm: NDArray[np.float64]
@@ -37,6 +39,7 @@ class Ball:
     core_hu: float
     method: str
     warnings: tuple[str, ...] = field(default=())
+    clipped: bool = False
 
     @property
     def sigma_mm(self) -> NDArray[np.float64]:

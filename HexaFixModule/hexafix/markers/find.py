@@ -161,7 +161,8 @@ def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -
     by_model = thick and model is not None
     covariance = centre_covariance(rays, model, by_model=by_model)
     warnings = []
-    if rays.clipped_share > CLIPPED_SHARE:
+    clipped = rays.clipped_share > CLIPPED_SHARE
+    if clipped:
         warnings.append(
             f"{rays.clipped_share:.0%} of the ball's core is clipped (limit {CLIPPED_SHARE:.0%}): "
             "fitted by its edges, its diameter may look too large (H11)"
@@ -173,7 +174,14 @@ def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -
         if by_model:
             center, method = model.center_mm, "model-fit"
     return Ball(
-        center, 2.0 * fitted, covariance, rays.rms_mm, rays.core_hu, method, tuple(warnings)
+        center_mm=center,
+        diameter_mm=2.0 * fitted,
+        covariance_mm2=covariance,
+        rms_residual_mm=rays.rms_mm,
+        core_hu=rays.core_hu,
+        method=method,
+        warnings=tuple(warnings),
+        clipped=clipped,
     )
 
 

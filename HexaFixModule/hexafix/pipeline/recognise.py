@@ -172,15 +172,21 @@ def _gates(
     mechanism: MechanismPose,
 ) -> tuple[gates.Gate, ...]:
     """G2 to G5, G7 and the side."""
-    diameters = {
-        side: [balls.balls[index].diameter_mm for index in _of_layout(layout, numbering)]
-        for side, layout in (("proximal", case.proximal), ("distal", case.distal))
-    }
+    sizes = []
+    for side, layout in (("proximal", case.proximal), ("distal", case.distal)):
+        chosen = [balls.balls[index] for index in _of_layout(layout, numbering)]
+        sizes.append(
+            gates.ball_diameters(
+                side,
+                [ball.diameter_mm for ball in chosen],
+                case.ball_diameter_mm,
+                clipped=any(ball.clipped for ball in chosen),
+            )
+        )
     found = [
         gates.ring_rms("proximal", proximal.rms_mm),
         gates.ring_rms("distal", distal.rms_mm),
-        gates.ball_diameters("proximal", diameters["proximal"], case.ball_diameter_mm),
-        gates.ball_diameters("distal", diameters["distal"], case.ball_diameter_mm),
+        *sizes,
         gates.moving_ring_above(mechanism.pose),
         gates.rings_face_each_other(proximal.pose, distal.pose),
         gates.angles_rebuild("proximal ring", proximal.pose),
