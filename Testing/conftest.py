@@ -2,6 +2,7 @@
 
 import copy
 import json
+import os
 
 import pytest
 
@@ -59,3 +60,25 @@ def an_export(a_phantom, tmp_path_factory):
     case = case_from_document(raw, folder=folder, needs_image=False)
     plan_and_export(case, folder / "prescription", volume=a_phantom.volume)
     return folder / "prescription"
+
+
+def pytest_terminal_summary(terminalreporter):
+    """In CI a test skipped for anything but the third-party corpus counts as a failure."""
+    if not os.environ.get("HEXAFIX_CI"):
+        return
+    skipped = terminalreporter.stats.get("skipped", [])
+    wrong = [r for r in skipped if "corpus" not in str(getattr(r, "longrepr", ""))]
+    if wrong:
+        terminalreporter.section("skipped in CI")
+        for report in wrong:
+            terminalreporter.line(f"{report.nodeid}: {report.longrepr}")
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """Make the exit status of `pytest_terminal_summary` the process's."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if not os.environ.get("HEXAFIX_CI") or reporter is None:
+        return
+    skipped = reporter.stats.get("skipped", [])
+    if any("corpus" not in str(getattr(r, "longrepr", "")) for r in skipped):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -17,7 +17,10 @@ MOST_VOXELS = 1200
 CUT_MARGIN_RAD = 0.07
 """Half the distance of neighbouring rays, about."""
 TUKEY = 4.685
-MOST_STEPS, SETTLED_MM = 25, 5e-4
+MOST_STEPS, SETTLED_MM, NEARLY_SETTLED_MM = 25, 5e-4, 5e-3
+"""Steps at most; a centre that moves less than the first is settled. Few voxels beside a clipped
+core can make the weights waver: after the last step the second is enough for a gate."""
+
 SIGMA_RANGE_MM = (0.15, 3.0)
 
 
@@ -81,7 +84,7 @@ def fit_model(
     free = np.array([1, 1, 1, clip_hu is None, 1, 1], bool)
     basis = _polynomials(points / radius_mm)
     linear, tukey = np.zeros(14), np.ones(len(values))
-    rise, residual, normal = tukey, values, np.eye(14)
+    rise, residual, normal, moved = tukey, values, np.eye(14), np.inf
     for step in range(MOST_STEPS):
         share, slope = _ball_and_slopes(points, state, axis, nodes, weights)
         columns = np.hstack([basis[:, :4] * share[:, None], basis * (1.0 - share)[:, None]])
@@ -96,11 +99,10 @@ def fit_model(
         linear = linear + change[free.sum() :]
         state[free] += np.clip(change[: free.sum()], -0.4, 0.4)
         state[4:] = np.clip(state[4:], *SIGMA_RANGE_MM)
-        if step > 2 and np.abs(change[:3]).max() < SETTLED_MM:
+        moved = float(np.abs(change[:3]).max())
+        if step > 2 and moved < SETTLED_MM:
             break
-    else:
-        return None
-    if np.linalg.norm(state[:3]) > 0.5 * radius_mm:
+    if not moved < NEARLY_SETTLED_MM or np.linalg.norm(state[:3]) > 0.5 * radius_mm:
         return None
     square = float(np.sum(tukey * residual**2) / max(1.0, np.sum(tukey)))
     covariance = np.asarray(square * np.linalg.inv(normal)[:3, :3], float)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hexafix.imaging.volume import Volume
 from hexafix.markers.crop import Crop
 from hexafix.markers.directions import neighbour_average, sphere_directions
-from hexafix.markers.model import ModelFit
+from hexafix.markers.model import SIGMA_RANGE_MM, ModelFit
 from hexafix.markers.rays import DIRECTIONS, RayFit
 from hexafix.markers.uncertainty import CLIPPED_CORE
 
@@ -30,6 +30,8 @@ UNIFORMITY = 0.15
 """Median minus 5th percentile of the core, over the contrast, the noise apart."""
 HOMOGENEITY = 0.12
 """RMS of the model's residual over the contrast."""
+SHARPEST = 1.2
+"""A blur below this many times the model's lower bound is no scanner's: the shape is no ball."""
 STEM_SHELLS_MM = (0.9, 2.0, 3.5)
 """Where a metal stem is looked for, beyond the ball's radius."""
 STEM_SHARE, STEM_GROWTH = 0.8, 0.08
@@ -109,6 +111,10 @@ def model_failures(model: ModelFit | None, rays: RayFit, *, thick: bool) -> Iter
         if not thick or rays.clipped_share <= CLIPPED_CORE:
             yield "model: the blurred ball does not fit"
         return
+    sharpest = SHARPEST * SIGMA_RANGE_MM[0]
+    blur = min(model.sigma_plane_mm, model.sigma_slice_mm)
+    if blur < sharpest and not rays.is_mask:
+        yield f"blur: {blur:.2f} mm, limit {sharpest:.2f} mm"
     noise = rays.core_noise_hu
     limit = HOMOGENEITY * contrast + 1.5 * noise
     if model.rms_hu > limit:
