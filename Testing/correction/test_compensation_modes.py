@@ -9,7 +9,6 @@ from hexafix.correction import (
     motion_between,
     target_of,
 )
-from hexafix.correction.compensation import adjoint
 from hexafix.errors import InputError
 from hexafix.geometry import Pose
 from scipy.optimize import minimize
@@ -181,7 +180,7 @@ def test_an_unknown_mode_is_an_input_error(scene):
 def test_the_adjoint_carries_twists_between_frames(random_pose):
     rng = np.random.default_rng(8)
     frame, twist = random_pose(rng), rng.normal(size=6) * SIGMA
-    close(frame @ Pose.exp(twist) @ frame.inverse(), Pose.exp(adjoint(frame) @ twist), atol=1e-9)
+    close(frame @ Pose.exp(twist) @ frame.inverse(), Pose.exp(frame.adjoint @ twist), atol=1e-9)
 
 
 def test_fused_leaves_less_than_additive_and_additive_less_than_nothing():

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hexafix.correction.fragment import FragmentMotion, Moving, TargetPose
 from hexafix.errors import InputError
-from hexafix.geometry import Pose, skew
+from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
 from hexafix.kinematics import strut_jacobian
 
@@ -152,7 +152,7 @@ def fuse_rings(
     """
     weight_a = np.linalg.inv(rings.proximal_covariance)
     prior = np.linalg.inv(rings.distal_covariance)
-    slope = adjoint(theoretical.inverse())
+    slope = theoretical.inverse().adjoint
     if theoretical_covariance is not None:
         weight_t = np.linalg.inv(np.asarray(theoretical_covariance, float))
         prior = np.block([[prior, np.zeros((6, 6))], [np.zeros((6, 6)), weight_t]])
@@ -268,15 +268,6 @@ def motion_between(compensation: Compensation, *, target: Pose, moving: Moving) 
         return FragmentMotion("proximal", compensation.distal @ target @ start.inverse())
     start = compensation.proximal @ compensation.start.inverse()
     return FragmentMotion("distal", compensation.proximal @ target.inverse() @ start.inverse())
-
-
-def adjoint(pose: Pose) -> NDArray[np.float64]:
-    """Ad(T), shape (6, 6), with T exp(ξ) T⁻¹ = exp(Ad(T) ξ), ξ = (ρ, θ)."""
-    r = pose.rotation
-    out = np.zeros((6, 6))
-    out[:3, :3] = out[3:, 3:] = r
-    out[:3, 3:] = skew(pose.position_mm) @ r
-    return out
 
 
 def _wrapped(angles_rad: ArrayLike) -> NDArray[np.float64]:

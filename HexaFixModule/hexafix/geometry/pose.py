@@ -12,6 +12,7 @@ from hexafix.geometry.rotations import (
     angles_xyz_fixed_from_matrix,
     is_rotation,
     matrix_from_xyz_fixed,
+    skew,
 )
 
 
@@ -88,6 +89,14 @@ class Pose:
 
         coords = RigidTransform.from_matrix(self.matrix).as_exp_coords()
         return np.concatenate([coords[3:], coords[:3]])
+
+    @property
+    def adjoint(self) -> NDArray[np.float64]:
+        """Ad(T), shape (6, 6), with T exp(ξ) T⁻¹ = exp(Ad(T) ξ), ξ = (mm, rad)."""
+        matrix = np.zeros((6, 6))
+        matrix[:3, :3] = matrix[3:, 3:] = self.rotation
+        matrix[:3, 3:] = skew(self.position_mm) @ self.rotation
+        return matrix
 
     @property
     def matrix(self) -> NDArray[np.float64]:

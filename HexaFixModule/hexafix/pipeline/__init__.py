@@ -7,7 +7,8 @@ forward_kinematics → correction target, compensation → make_schedule → rep
 from hexafix.pipeline.layout import check_case_layout
 from hexafix.pipeline.plan import Plan, plan_correction
 from hexafix.pipeline.prescribe import plan_and_export
-from hexafix.pipeline.recognise import Recognised, find_markers, recognise, recognise_case
+from hexafix.pipeline.recognise import find_markers, recognise, recognise_case
+from hexafix.pipeline.recognised import Recognised
 
 __all__ = [
     "Plan",

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hexafix.case import Case
+from hexafix.markers import BallSet
 from hexafix.pipeline.numbers import covariance_document, pose_document, rounded
+from hexafix.pipeline.recognised import Recognised
 from hexafix.recognition import RingPose
-
-if TYPE_CHECKING:
-    from hexafix.markers import BallSet
-    from hexafix.pipeline.recognise import Recognised
 
 
 def recognition(case: Case, recognised: Recognised) -> dict[str, Any]:

@@ -25,7 +25,8 @@ from hexafix.correction.targets import planned_motion
 from hexafix.errors import HexaFixError, LayoutRejected
 from hexafix.geometry import Pose
 from hexafix.imaging import Volume
-from hexafix.pipeline.recognise import Recognised, read_case_image, recognise
+from hexafix.pipeline.recognise import read_case_image, recognise
+from hexafix.pipeline.recognised import Recognised
 from hexafix.pipeline.strut_witness import WeighedStruts, weigh_struts
 from hexafix.progress import Progress, silent
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from hexafix.correction.landmarks import Landmarks, fit_landmarks
 from hexafix.geometry import Pose
 from hexafix.pipeline import document
 from hexafix.pipeline.numbers import pose_document, rounded
-
-if TYPE_CHECKING:
-    from hexafix.pipeline.plan import Plan
+from hexafix.pipeline.plan import Plan
 
 NOTICE = (
     "Research software. Not a medical device. Not to be followed unless a surgeon has checked and "

@@ -13,7 +13,7 @@ from hexafix.imaging import Volume
 from hexafix.pipeline import plan_document
 from hexafix.pipeline.document import recognition
 from hexafix.pipeline.plan import plan_recognised, recognise_checked
-from hexafix.pipeline.recognise import Recognised
+from hexafix.pipeline.recognised import Recognised
 from hexafix.progress import Progress, silent
 from hexafix.report.pdf import prescription_pdf
 from hexafix.report.picture import SceneRenderer

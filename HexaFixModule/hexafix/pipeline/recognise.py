@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from hexafix.imaging import Volume, read_volume
 from hexafix.kinematics import strut_lengths
 from hexafix.markers import BallSet, find_balls
 from hexafix.pipeline import document
+from hexafix.pipeline.recognised import Recognised
 from hexafix.progress import Progress, silent
 from hexafix.recognition import (
     MechanismPose,
@@ -27,36 +27,6 @@ from hexafix.recognition import (
     ring_pose,
     ring_pose_by_groups,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Recognised:
-    """What the image alone tells.
-
-    Attributes
-    ----------
-    volume : Volume
-    balls : BallSet
-    numbering : Numbering
-    proximal, distal : RingPose
-        By covariance-weighted least squares.
-    proximal_by_groups, distal_by_groups : RingPose
-        By the paper's group method, for comparison.
-    mechanism : MechanismPose
-        X_r, {A} in {B}.
-    gates : tuple of Gate
-        G2 to G5, G7 and the side, decided or not.
-    """
-
-    volume: Volume
-    balls: BallSet
-    numbering: Numbering
-    proximal: RingPose
-    distal: RingPose
-    proximal_by_groups: RingPose
-    distal_by_groups: RingPose
-    mechanism: MechanismPose
-    gates: tuple[gates.Gate, ...]
 
 
 def find_markers(

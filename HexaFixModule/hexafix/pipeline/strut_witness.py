@@ -28,7 +28,7 @@ from hexafix.kinematics import (
     second_starts,
     strut_lengths,
 )
-from hexafix.pipeline.recognise import Recognised
+from hexafix.pipeline.recognised import Recognised
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.geometry import Pose, skew
+from hexafix.geometry import Pose
 from hexafix.recognition.least_squares import RingPose
 
 
@@ -32,14 +32,6 @@ class MechanismPose:
         return np.sqrt(np.diag(self.covariance))
 
 
-def adjoint(pose: Pose) -> NDArray[np.float64]:
-    """Matrix Ad of shape (6, 6) with T exp(ξ) T⁻¹ = exp(Ad ξ), ξ = (mm, rad)."""
-    matrix = np.zeros((6, 6))
-    matrix[:3, :3] = matrix[3:, 3:] = pose.rotation
-    matrix[:3, 3:] = skew(pose.position_mm) @ pose.rotation
-    return matrix
-
-
 def mechanism_pose(*, proximal: RingPose, distal: RingPose) -> MechanismPose:
     """Pose of the moving ring in the base ring, X = T_B⁻¹ T_A.
 
@@ -49,7 +41,7 @@ def mechanism_pose(*, proximal: RingPose, distal: RingPose) -> MechanismPose:
     measured independently.
     """
     pose = distal.pose.inverse() @ proximal.pose
-    carried = adjoint(pose.inverse())
+    carried = pose.inverse().adjoint
     covariance = proximal.covariance + carried @ distal.covariance @ carried.T
     covariance = 0.5 * (covariance + covariance.T)
     covariance.setflags(write=False)
