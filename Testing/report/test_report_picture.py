@@ -125,8 +125,10 @@ def test_the_rendered_bone_and_balls_stand_where_the_view_projects_them(
         scale = np.array(_png_size(png)) / [view.width_mm, view.height_mm]
         # Ball 4 sits 45 mm above its ring: nothing stands before it in any view.
         x, y = (view.project(scene.balls[3].center_mm)[:2] * scale).astype(int)
-        assert np.ptp(pixels[y, x]) < 40, "a ball is grey"
-        assert pixels[y, x].max() < 254
+        # The middle of a ball may hold the highlight; most of it does not.
+        ball = np.median(pixels[y - 7 : y + 8, x - 7 : x + 8].reshape(-1, 3), axis=0)
+        assert np.ptp(ball) < 40, "a ball is grey"
+        assert ball.max() < 245
         middle = scene.distal_lps @ [0, 0, 90, 1]
         x, y = (view.project(middle[:3])[:2] * scale).astype(int)
         red, _, blue = np.median(pixels[y - 4 : y + 5, x - 4 : x + 5].reshape(-1, 3), axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,6 +42,7 @@ def run_demo(out: Path, *, seed: int, progress: Progress) -> tuple[dict[str, Any
     from hexafix.pipeline import plan_and_export
     from hexafix.verify import verify_export
 
+    _clear_own_phantom(out / "phantom")
     truth = run_phantom(
         out / "phantom", seed=seed, image_format="dicom", options={}, progress=progress
     )
@@ -67,6 +69,13 @@ def run_demo(out: Path, *, seed: int, progress: Progress) -> tuple[dict[str, Any
         "errors": errors,
     }
     return summary, _text(summary, export)
+
+
+def _clear_own_phantom(folder: Path) -> None:
+    """Remove the phantom of an earlier demo, and nothing else."""
+    held = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    if "truth.json" in held and held <= {"ct", "truth.json", "case.json"}:
+        shutil.rmtree(folder)
 
 
 def _text(summary: dict[str, Any], export: Path) -> str:
