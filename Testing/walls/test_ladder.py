@@ -164,3 +164,12 @@ def test_the_slicer_entrance_imports_without_slicer_and_does_no_arithmetic():
     names = {name.split(".")[0] for name in imports(entrance)}
     assert names <= {"hexafix", "slicer", "sys", "pathlib", "typing", "tempfile", "__future__"}
     assert "HexaFixModule" in modules_after("import HexaFixModule")
+
+
+def test_the_public_names_are_loaded_when_used():
+    import hexafix
+
+    for name in hexafix.__all__:
+        assert getattr(hexafix, name) is not None
+    with pytest.raises(AttributeError):
+        _ = hexafix.no_such_name
