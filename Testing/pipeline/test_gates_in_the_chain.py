@@ -1,6 +1,7 @@
 """Each fault of hazards.md that this chain can meet is refused with its hazard id."""
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -187,6 +188,11 @@ def pose(position_mm, angles_deg=(0, 0, 0)):
         (gates.forward_basin, (1e-9, 20), (np.inf, 20)),
         (gates.well_conditioned, (5.0,), (500.0,)),
         (gates.realised_rate, (1.4, 1.0, 0.5), (2.1, 1.0, 0.5)),
+        (
+            gates.angles_rebuild,
+            ("mechanism", pose([0, 0, 0], (10, 20, 30))),
+            ("mechanism", SimpleNamespace(rotation=-np.eye(3), angles_rad=np.zeros(3))),
+        ),
         (gates.sides_agree, ("left", None), ("left", "R")),
         (gates.sides_agree, ("left", "L"), ("right", "L")),
     ],
@@ -218,3 +224,13 @@ def test_recognition_error_is_refused_in_position_and_in_orientation():
 def test_the_recomputation_gate_refuses_a_plan_that_ends_elsewhere():
     assert gates.red(gates.recomputed(0.1, 0.05)) == ()
     assert len(gates.red(gates.recomputed(0.3, 0.2))) == 2
+
+
+def test_a_relaxed_layout_is_red_without_the_users_word_and_a_violated_one_always():
+    def passed(rule, accepted):
+        return gates.layout_rule("proximal", rule, 20.0, relaxed_accepted=accepted).passed
+
+    assert passed("preferred", False)
+    assert passed("relaxed", True)
+    assert not passed("relaxed", False)
+    assert not passed("violated", True)
