@@ -43,7 +43,9 @@ class Pose:
             raise InputError.of(
                 "not-rigid",
                 "the matrix is not a rigid motion (mirrored, scaled, sheared or not finite)",
-                value=f"det {np.linalg.det(rotation):+.6f}" if rotation.shape == (3, 3) else None,
+                value=f"det {np.linalg.det(rotation):+.6f}"
+                if rotation.shape == (3, 3) and np.all(np.isfinite(rotation))
+                else None,
                 limit="rotation orthonormal to 1e-6 with determinant +1",
                 hazard="H01",
                 next_step="give a rotation and a translation only",

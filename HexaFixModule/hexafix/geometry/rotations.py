@@ -90,10 +90,28 @@ def angles_xyz_fixed_from_matrix(rotation: ArrayLike) -> NDArray[np.float64]:
 def is_rotation(matrix: ArrayLike, tolerance: float = 1e-6) -> bool:
     """Whether every (..., 3, 3) matrix is orthonormal to `tolerance` with determinant +1."""
     r = np.asarray(matrix, float)
+    if r.shape == (3, 3):
+        return _is_one_rotation(r, tolerance)
     if r.shape[-2:] != (3, 3) or not np.all(np.isfinite(r)):
         return False
     gram = np.swapaxes(r, -1, -2) @ r
     return bool(np.all(np.abs(gram - np.eye(3)) <= tolerance) and np.all(np.linalg.det(r) > 0))
+
+
+def _is_one_rotation(r: NDArray[np.float64], tolerance: float) -> bool:
+    """`is_rotation` of one matrix in plain numbers: every pose is checked, so it must be quick."""
+    (a, b, c), (d, e, f), (g, h, i) = r.tolist()
+    offs = (
+        a * a + d * d + g * g - 1.0,
+        b * b + e * e + h * h - 1.0,
+        c * c + f * f + i * i - 1.0,
+        a * b + d * e + g * h,
+        a * c + d * f + g * i,
+        b * c + e * f + h * i,
+    )
+    # NaN compares false, so it is no rotation
+    orthonormal = all(abs(off) <= tolerance for off in offs)
+    return orthonormal and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0
 
 
 def skew(vector: ArrayLike) -> NDArray[np.float64]:

@@ -131,8 +131,12 @@ def forward_kinematics_batch(
 
 def _checked_lengths(lengths_mm: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     q = np.asarray(lengths_mm, float)
-    # NaN is neither above 0 nor below infinity
-    if q.shape != shape or (q.size and not (q.min() > 0.0 and q.max() < np.inf)):
+    # NaN is neither above 0 nor below infinity; six numbers are quicker by themselves
+    if q.size == 6:
+        sound = all(0.0 < length < np.inf for length in q.ravel().tolist())
+    else:
+        sound = not q.size or bool(q.min() > 0.0 and q.max() < np.inf)
+    if q.shape != shape or not sound:
         raise InputError.of(
             "strut-lengths",
             "six positive finite strut lengths are needed",

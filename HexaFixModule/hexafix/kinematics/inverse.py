@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -113,6 +115,7 @@ def strut_jacobian_batch(
     return np.concatenate([axes_in_ring, moments], axis=-1)
 
 
+@lru_cache(maxsize=64)
 def joint_radius_mm(fixator: Fixator) -> float:
     """Root mean square distance of the moving ring's joints from its z axis, mm."""
     joints = fixator.proximal.joints_mm[:, :2]

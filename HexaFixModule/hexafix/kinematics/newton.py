@@ -11,6 +11,7 @@ from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg.lapack import dgesv
 
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
@@ -99,9 +100,9 @@ def solve_one(lengths_mm: NDArray[np.float64], fixator: Fixator, *, start: Pose)
         worst = max(map(abs, missing.tolist()))
         if worst <= TOLERANCE_MM or not worst < np.inf or iteration == MAX_ITERATIONS:
             break
-        try:
-            step = np.linalg.solve(columns.T, missing)
-        except np.linalg.LinAlgError:
+        # LAPACK without numpy's wrapper, whose overhead is longer than the solution of six rows
+        *_, step, singular = dgesv(columns.T, missing)
+        if singular:
             break
         x, y, z, u, v, w = step.tolist()
         shift, angle = sqrt(x * x + y * y + z * z), sqrt(u * u + v * v + w * w)
