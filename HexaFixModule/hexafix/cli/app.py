@@ -192,16 +192,22 @@ def plan(
     quiet: Quiet = False,
 ) -> int:
     """Run the whole chain and write the export: plan, schedule, PDF, markers, manifest."""
-    from hexafix.case import load_case
-    from hexafix.cli.show import plan_text
     from hexafix.export import check_target
-    from hexafix.pipeline import plan_and_export
+    from hexafix.report.picture import SceneRenderer
 
     check_target(out)
-    loaded = load_case(case)
-    with progress_bar(quiet=quiet) as progress:
+    # the picture's process loads its libraries while this one loads the chain
+    with SceneRenderer() as renderer, progress_bar(quiet=quiet) as progress:
+        from hexafix.case import load_case
+        from hexafix.cli.show import plan_text
+        from hexafix.pipeline import plan_and_export
+
         document = plan_and_export(
-            loaded, out, accept_relaxed_layout=accept_relaxed_layout, progress=progress
+            load_case(case),
+            out,
+            accept_relaxed_layout=accept_relaxed_layout,
+            renderer=renderer,
+            progress=progress,
         )
     print_json(document) if json else print(plan_text(document, out))
     return 0

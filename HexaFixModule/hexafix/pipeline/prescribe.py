@@ -27,6 +27,7 @@ def plan_and_export(
     *,
     volume: Volume | None = None,
     accept_relaxed_layout: bool = False,
+    renderer: SceneRenderer | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """The whole chain: plan, recompute by another road, print, read back, write.
@@ -38,6 +39,9 @@ def plan_and_export(
         Where the export goes, all or nothing.
     volume, accept_relaxed_layout, progress
         As in `plan_correction`.
+    renderer : SceneRenderer, optional
+        Started by the caller before it loaded this room, so that both load side by side; it is
+        closed here.
 
     Returns
     -------
@@ -50,7 +54,7 @@ def plan_and_export(
         If a gate is red; nothing is written and an older export stays as it is.
     """
     export.check_target(folder)
-    with SceneRenderer() as renderer:
+    with renderer or SceneRenderer() as renderer:
         recognised = recognise_checked(
             case, volume=volume, accept_relaxed_layout=accept_relaxed_layout, progress=progress
         )
