@@ -13,6 +13,7 @@ LADDER = {
     "errors": 0,
     "progress": 0,
     "paths": 1,
+    "strict_json": 1,
     "__init__": 1,
     "geometry": 2,
     "hardware": 3,
@@ -42,6 +43,7 @@ SIDEWAYS_OR_DOORS = {"vtk", "vtkmodules", "pyvista", "slicer", "qt", "ctk", "qtp
 LIBRARIES = {
     "errors": set(),
     "paths": set(),
+    "strict_json": set(),
     "progress": set(),
     "geometry": {"numpy", "scipy"},
     "hardware": {"numpy"},

@@ -14,7 +14,6 @@ from pydantic import BaseModel, ValidationError
 from hexafix.case import checks
 from hexafix.case.case import Case, Limb, ScheduleRules
 from hexafix.case.schema import CaseFile, LayoutFile
-from hexafix.case.strict_json import parse_json_object, read_json_object
 from hexafix.correction.targets import (
     Correction,
     FragmentMotion,
@@ -26,6 +25,7 @@ from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, MarkerSite
 from hexafix.hardware.definition import fixator_from_document, shipped_fixators
 from hexafix.paths import resources
+from hexafix.strict_json import parse_json_object, read_json_object
 
 
 def load_case(path: Path, *, needs_image: bool = True, plannable: bool = True) -> Case:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hexafix.errors import Fault, HardwareDefinitionError
+from hexafix.errors import Fault, HardwareDefinitionError, InputError
 from hexafix.hardware.fixator import Fixator, Ring, StrutType
 from hexafix.paths import resources
+from hexafix.strict_json import read_json_object
 
 SCHEMA_VERSION = 1
 _TOP = ("schema_version", "id", "name", "source", "proximal", "distal", "strut")
@@ -58,26 +59,22 @@ def read_fixator(path: str | Path) -> Fixator:
     """
     file = Path(path)
     try:
-        document = json.loads(
-            file.read_text(encoding="utf-8"),
-            object_pairs_hook=_no_doubled_keys,
-            parse_constant=_no_constant,
-        )
-    except OSError as error:
-        raise HardwareDefinitionError.of(
-            "hardware-unreadable",
-            f"the hardware definition cannot be read: {error.strerror or error}",
-            where=str(file),
-            next_step="check the path",
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise HardwareDefinitionError.of(
-            "hardware-not-json",
-            f"the hardware definition is not valid JSON: {error}",
-            where=str(file),
-            next_step="correct the file with a JSON editor",
-        ) from error
+        _, document = read_json_object(file, what="hardware definition")
+    except InputError as error:
+        raise HardwareDefinitionError(*map(_hardware_fault, error.faults)) from error
     return fixator_from_document(document, where=file.name)
+
+
+def _hardware_fault(fault: Fault) -> Fault:
+    """A fault of the file as one of the hardware definition."""
+    if fault.code == "file-unreadable":
+        return replace(fault, code="hardware-unreadable")
+    return replace(
+        fault,
+        code="hardware-not-json",
+        what=f"the hardware definition is not valid JSON: {fault.what}",
+        next_step="correct the file with a JSON editor",
+    )
 
 
 def fixator_from_document(document: Any, *, where: str = "fixator") -> Fixator:
@@ -116,18 +113,6 @@ def fixator_from_document(document: Any, *, where: str = "fixator") -> Fixator:
     if check.faults or proximal is None or distal is None or strut is None:
         raise HardwareDefinitionError(*check.faults)
     return Fixator(**texts, proximal=proximal, distal=distal, strut=strut)
-
-
-def _no_doubled_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    keys = [key for key, _ in pairs]
-    doubled = sorted({key for key in keys if keys.count(key) > 1})
-    if doubled:
-        raise ValueError(f"key given twice: {', '.join(doubled)}")
-    return dict(pairs)
-
-
-def _no_constant(word: str) -> float:
-    raise ValueError(f"{word} is not a number of JSON")
 
 
 def _is_number(value: Any) -> bool:

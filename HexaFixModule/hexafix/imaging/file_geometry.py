@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.errors import Fault
+from hexafix.errors import Fault, InputError
 from hexafix.imaging.slice_stack import TILT_TOLERANCE_DEG
 
 CORNER_TOLERANCE_MM = 0.01
@@ -104,3 +104,16 @@ def detached_fault(where: str) -> Fault:
         hazard="H50",
         where=where,
     )
+
+
+def require_three_dimensions(count: int, where: str) -> None:
+    """Refuse a header that declares another number of dimensions than three."""
+    if count != 3:
+        raise InputError.of(
+            "not-a-volume",
+            "the image does not have three dimensions",
+            value=f"{count} dimensions",
+            limit="3",
+            where=where,
+            next_step="store one three-dimensional volume",
+        )

@@ -14,6 +14,7 @@ from hexafix.imaging.file_geometry import (
     detached_fault,
     outside_folder,
     refuse_geometry,
+    require_three_dimensions,
 )
 
 _MAX_HEADER = 1 << 16
@@ -42,15 +43,7 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     if data_file.upper() != "LOCAL" and outside_folder(path, data_file):
         raise ImageRefused(detached_fault(where))
     size = _numbers(fields, ("dimsize",), where)
-    if len(size) != 3:
-        raise InputError.of(
-            "not-a-volume",
-            "the image does not have three dimensions",
-            value=f"{len(size)} dimensions",
-            limit="3",
-            where=where,
-            next_step="store one three-dimensional volume",
-        )
+    require_three_dimensions(len(size), where)
     spacing = _numbers(fields, ("elementspacing",), where)
     origin = _numbers(fields, ("offset", "position", "origin"), where)
     axes = _numbers(fields, ("transformmatrix", "rotation", "orientation"), where)

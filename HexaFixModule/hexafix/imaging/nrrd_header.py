@@ -13,6 +13,7 @@ from hexafix.imaging.file_geometry import (
     detached_fault,
     outside_folder,
     refuse_geometry,
+    require_three_dimensions,
 )
 
 # Signs that turn the space's axes into left, posterior, superior.
@@ -48,15 +49,7 @@ def read_nrrd_header(path: Path) -> FileGeometry:
         size = tuple(int(n) for n in fields["sizes"].split())
     except (KeyError, ValueError):
         raise _broken("sizes") from None
-    if len(size) != 3:
-        raise InputError.of(
-            "not-a-volume",
-            "the image does not have three dimensions",
-            value=f"{len(size)} dimensions",
-            limit="3",
-            where=where,
-            next_step="store one three-dimensional volume",
-        )
+    require_three_dimensions(len(size), where)
     signs = _SPACES.get(fields.get("space", "").strip().lower())
     if signs is None:
         raise ImageRefused(

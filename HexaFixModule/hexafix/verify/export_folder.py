@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hexafix.case.strict_json import parse_json_object, read_json_object
 from hexafix.errors import InputError
+from hexafix.export import FILES, MANIFEST
+from hexafix.strict_json import parse_json_object, read_json_object
 from hexafix.verify.check import Check, stated
 from hexafix.verify.printed import check_printed
 from hexafix.verify.recompute import recompute
-
-FILES = ("plan.json", "schedule.csv", "prescription.pdf", "markers.mrk.json")
 
 
 def verify_export(folder: Path) -> dict[str, Any]:
@@ -36,7 +35,7 @@ def verify_export(folder: Path) -> dict[str, Any]:
         If there is no export in the folder or it cannot be read.
     """
     folder = Path(folder)
-    _, manifest = read_json_object(folder / "manifest.json", what="manifest")
+    _, manifest = read_json_object(folder / MANIFEST, what="manifest")
     files = _read_files(folder)
     checks = _file_checks(files, manifest)
     document = parse_json_object(files["plan.json"], what="plan", where="plan.json")

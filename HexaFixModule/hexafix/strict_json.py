@@ -72,7 +72,7 @@ def parse_json_object(raw: bytes, *, what: str, where: str) -> dict[str, Any]:
             *(
                 Fault(
                     "duplicate-key",
-                    f"the key {key!r} stands twice in one object",
+                    f"key given twice: {key}",
                     where=where,
                     hazard="H55",
                     next_step="keep one of them",
