@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hexafix.benchmark.balls import varied_spec
+from hexafix.benchmark.reading import simpleitk_series
 from hexafix.imaging import read_volume
 from hexafix.phantom import PhantomSpec, make_phantom, write_phantom
 
@@ -48,7 +49,7 @@ def plan_time(*, seed: int = 1, rounds: int = 3, quick: bool = False) -> dict[st
         ours, theirs, plans = [], [], []
         for turn in range(rounds):
             ours.append(_timed(lambda: read_volume(folder / "case" / "ct")))
-            theirs.append(_timed(lambda: _simpleitk_series(folder / "case" / "ct")))
+            theirs.append(_timed(lambda: simpleitk_series(folder / "case" / "ct")))
             command = [sys.executable, "-m", "hexafix", "plan", str(folder / "case")]
             command += ["--out", str(folder / f"out-{turn}"), "--quiet"]
             plans.append(_timed(lambda: _run(command)))  # noqa: B023 - called at once
@@ -83,11 +84,3 @@ def _timed(work: Any) -> float:
 def _run(command: list[str]) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
-
-
-def _simpleitk_series(folder: Path) -> None:
-    import SimpleITK as sitk  # noqa: N813 - the library's own abbreviation
-
-    reader = sitk.ImageSeriesReader()
-    reader.SetFileNames(reader.GetGDCMSeriesFileNames(str(folder)))
-    reader.Execute()

@@ -143,6 +143,18 @@ def _chain(quick: bool) -> Iterator[Row]:
     yield _row("hexafix --help", start["help_s"], 0.3, "s", f"python {start['python_s']:.3f} s")
 
 
+def _reading(quick: bool) -> Iterator[Row]:
+    from hexafix.benchmark.reading import reading_time
+
+    result = reading_time(
+        size_ijk=(128, 128, 60) if quick else (512, 512, 600), rounds=1 if quick else 5
+    )
+    size = "×".join(map(str, result["size_ijk"]))
+    yield _row(f"reading {size} DICOM over SimpleITK's series reader", result["ratio"], 1.0, "×",
+               f"{result['hexafix_s']:.2f} s, SimpleITK {result['simpleitk_s']:.2f} s, "
+               f"pydicom {result['pydicom_s']:.2f} s")  # fmt: skip
+
+
 GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "balls": _balls,
     "search": _search,
@@ -151,5 +163,6 @@ GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "kinematics": _kinematics,
     "compensation": _compensation,
     "chain": _chain,
+    "reading": _reading,
 }
 """What can be measured, by name."""
