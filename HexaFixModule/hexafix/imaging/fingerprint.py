@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-THREADS = 2
+from hexafix.threads import thread_count
 
 # Corner positions enter on a grid of 1 µm, so that the rounding of a text header does not change
 # the hash. The odd offset keeps decimal positions off the edges of that grid.
@@ -46,5 +46,5 @@ def combine(slice_hashes: Sequence[bytes], voxels: NDArray, ijk_to_lps: NDArray)
 
 def fingerprint(voxels: NDArray, ijk_to_lps: NDArray) -> str:
     """The hash of a whole volume in memory; parameters as in `combine`."""
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(thread_count()) as pool:
         return combine(list(pool.map(hash_slice, voxels)), voxels, ijk_to_lps)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from hexafix.errors import Fault, ImageRefused, InputError
 from hexafix.imaging.decoding import decode_frames, require_decoder
 from hexafix.imaging.dicom_header import DEFLATED, EXPLICIT_BIG, PLAIN_SYNTAXES, SliceHeader
-from hexafix.imaging.fingerprint import THREADS, hash_slice
+from hexafix.imaging.fingerprint import hash_slice
 from hexafix.imaging.hounsfield import NeedsFloat, convert, stored_type
 from hexafix.imaging.slice_stack import SliceStack, listed
 from hexafix.progress import Progress
+from hexafix.threads import thread_count
 
 # Far above any CT of a limb (1024 x 1024 x 1500), far below what would exhaust a workstation.
 MAX_VOXELS = 1_600_000_000
@@ -87,7 +88,7 @@ def faults_of_length(slices: Sequence[SliceHeader]) -> list[Fault]:
 
 
 def read_pixels(stack: SliceStack, progress: Progress) -> Pixels:
-    """Read, rescale and hash the slices of a stack with two threads.
+    """Read, rescale and hash the slices of a stack on several threads.
 
     Parameters
     ----------
@@ -122,9 +123,10 @@ def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) ->
     hashes: list[bytes] = [b""] * len(slices)
     lowest = [0.0] * len(slices)
     stop = Event()
+    threads = thread_count()
     # A child process that decodes should serve many slices; plain reading is best in small turns.
     plain = all(item.pixels.transfer_syntax in PLAIN_SYNTAXES for item in slices)
-    batch = _BATCH if plain else max(-(-len(slices) // THREADS), _CHILD_BATCH)
+    batch = _BATCH if plain else max(-(-len(slices) // threads), _CHILD_BATCH)
 
     def fill(start: int) -> None:
         end = min(start + batch, len(slices))
@@ -136,7 +138,7 @@ def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) ->
                 lowest[k] = float(voxels[k].min())
                 hashes[k] = hash_slice(voxels[k])
 
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         futures = [pool.submit(fill, start) for start in range(0, len(slices), batch)]
         try:
             pending = set(futures)

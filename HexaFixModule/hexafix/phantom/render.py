@@ -14,6 +14,7 @@ from hexafix.phantom.solids import Array, Grid, Solid, paint
 from hexafix.phantom.spec import AIR_HU, LOWEST_HU, PhantomSpec
 from hexafix.phantom.streaks import Streak, add_streak
 from hexafix.progress import Progress
+from hexafix.threads import thread_count
 
 SLAB_SLICES = 8
 AXIAL_WEIGHTS = np.array([0.3, 1.0, 0.3]) / np.sqrt(1.18)
@@ -66,7 +67,7 @@ def render(
         voxels[first:last] = slab
 
     starts = range(0, nk, SLAB_SLICES)
-    with ThreadPoolExecutor(workers or min(8, os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(workers or thread_count(min(8, os.cpu_count() or 1))) as pool:
         jobs = [pool.submit(slab_of, first) for first in starts]
         try:
             for done, job in enumerate(jobs, start=1):
