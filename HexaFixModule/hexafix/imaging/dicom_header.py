@@ -1,11 +1,14 @@
 """The header of one DICOM file: what the geometry, the grey values and the choice of series need.
 
-Only the attributes listed here are ever looked at; nothing that names a patient is read.
+Only the attributes listed here are ever looked at. What names the patient is read for one purpose,
+to see whether all slices are of one patient: only a keyed hash of it is kept, in memory.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
+import secrets
 import struct
 import zlib
 from collections.abc import Sequence
@@ -33,7 +36,7 @@ _KEYWORDS = (
     *("HighBit", "PixelRepresentation", "PixelPaddingValue", "PixelPaddingRangeLimit"),
     *("RescaleSlope", "RescaleIntercept", "RescaleType", "ModalityLUTSequence"),
     *("LossyImageCompression", "SharedFunctionalGroupsSequence"),
-    "PerFrameFunctionalGroupsSequence",
+    *("PerFrameFunctionalGroupsSequence", "PatientName", "PatientID", "PatientBirthDate"),
 )
 _TAGS = [Tag(keyword) for keyword in _KEYWORDS]
 _TAG = dict(zip(_KEYWORDS, _TAGS, strict=True))
@@ -42,6 +45,8 @@ _PIXEL_TAGS = (_PIXEL_DATA, 0x7FE00008, 0x7FE00009)
 _UNDEFINED = 0xFFFFFFFF
 # A deflated header can blow up a thousandfold; no CT slice or multi-frame CT needs more than this.
 _MAX_INFLATED = 1 << 30
+# A new key in every process: outside of it the hashes of patients tell nothing.
+_PATIENT_KEY = secrets.token_bytes(16)
 
 
 class NotAnImage(Exception):
@@ -96,6 +101,8 @@ class SliceHeader:
         PixelSpacing: between rows (along j) first, then between columns (along i).
     slope, intercept : float or None
         Rescale to HU.
+    patient : bytes
+        Keyed hash of name, id and birth date, good for comparing slices within this process only.
     """
 
     path: Path
@@ -122,6 +129,7 @@ class SliceHeader:
     body_part: str | None
     patient_position: str | None
     pixels: PixelFormat
+    patient: bytes = b""
 
 
 def read_headers(path: Path) -> list[SliceHeader]:
@@ -314,7 +322,18 @@ def _common(
         "body_part": _text(dataset, "BodyPartExamined"),
         "patient_position": _text(dataset, "PatientPosition"),
         "pixels": pixels,
+        "patient": _patient(dataset),
     }
+
+
+def _patient(dataset: Dataset) -> bytes:
+    """Keyed hash of the identity, blind to padding, case and empty name components."""
+    parts = []
+    for keyword in ("PatientName", "PatientID", "PatientBirthDate"):
+        value = _raw(dataset, keyword)
+        raw = value if isinstance(value, bytes) else str(value or "").encode()
+        parts.append(raw.strip(b" \0").rstrip(b"^ ").upper())
+    return hashlib.blake2b(b"\n".join(parts), key=_PATIENT_KEY, digest_size=16).digest()
 
 
 def _frames(dataset: FileDataset, common: dict[str, Any], frames: int) -> list[SliceHeader]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import numpy as np
 from hexafix.errors import Fault, ImageRefused, InputError
 from hexafix.imaging.dicom_header import NotAnImage, SliceHeader, read_headers
 from hexafix.imaging.hounsfield import faults_of_values
-from hexafix.imaging.slice_stack import arrange
+from hexafix.imaging.slice_stack import arrange, listed
 from hexafix.progress import Progress, silent
 
 SECONDARY_CAPTURE = "1.2.840.10008.5.1.4.1.1.7"
@@ -118,6 +118,26 @@ def exclusion(item: SliceHeader) -> str | None:
     return None
 
 
+def faults_of_patients(slices: Sequence[SliceHeader]) -> list[Fault]:
+    """Slices of one series that name different patients, told without naming them (H38)."""
+    counts = Counter(item.patient for item in slices)
+    if len(counts) < 2:
+        return []
+    usual = counts.most_common(1)[0][0]
+    odd = [item.position_mm for item in slices if item.patient != usual]
+    places = ("(" + ", ".join(f"{v:.2f}" for v in place or ()) + ")" for place in odd)
+    return [
+        Fault(
+            "mixed-patient",
+            "the slices of one series differ in the patient's name, id or birth date",
+            value=f"{len(odd)} of {len(slices)} slices, origins at {listed(places)} mm LPS",
+            limit="one patient",
+            next_step="export the series of one patient alone, from the archive",
+            hazard="H38",
+        )
+    ]
+
+
 def list_series(folder: str | Path) -> tuple[SeriesSummary, ...]:
     """Every series below a folder, for the choice; series left out come with their reason.
 
@@ -163,6 +183,7 @@ def summarise(slices: Iterable[SliceHeader]) -> tuple[SeriesSummary, ...]:
 def _summary(excluded: str | None, items: list[SliceHeader]) -> SeriesSummary:
     first = items[0]
     stack, faults = arrange(items)
+    faults = faults_of_patients(items) + faults
     spacing, orientation = None, "unknown"
     if stack is not None:
         i, j, k = np.linalg.norm(stack.ijk_to_lps[:3, :3], axis=0)

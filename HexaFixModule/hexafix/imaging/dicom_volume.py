@@ -10,7 +10,13 @@ from typing import TypeVar
 from hexafix.errors import Fault, ImageRefused
 from hexafix.imaging.decoding import LOSSY_SYNTAXES
 from hexafix.imaging.dicom_header import SliceHeader
-from hexafix.imaging.dicom_series import DicomFolder, choose, exclusion, scan
+from hexafix.imaging.dicom_series import (
+    DicomFolder,
+    choose,
+    exclusion,
+    faults_of_patients,
+    scan,
+)
 from hexafix.imaging.fingerprint import combine
 from hexafix.imaging.hounsfield import faults_of_values
 from hexafix.imaging.pixel_data import (
@@ -35,7 +41,7 @@ def read_dicom(path: Path, series_instance_uid: str | None, progress: Progress) 
     slices = choose(folder, series_instance_uid)
     stack, faults = arrange(slices)
     readable = faults_of_values(slices) + faults_of_length(slices)
-    faults += readable + _repeated_instances(slices)
+    faults += readable + _repeated_instances(slices) + faults_of_patients(slices)
     if stack is not None and not readable:
         # Doubles are a fault only if their pixels differ, which needs pixels that can be read.
         faults += faults_of_doubles(stack)
@@ -106,5 +112,8 @@ def _warnings(
     )
     for reason, count in sorted(left_out.items()):
         yield f"left out (H05): {count} x {reason}"
+    others = sum(item.patient != slices[0].patient for item in folder.slices)
+    if others:
+        yield f"other patient (H38): {others} images in the folder name another patient"
     for reason, count in sorted(folder.skipped.items()):
         yield f"skipped: {count} x {reason}"
