@@ -31,26 +31,47 @@ def group_jacobians(layout: MarkerLayout) -> Array:
     truth, and for ξ, which has no gimbal.
     """
     groups = marker_groups(layout)
-    r = layout.points_mm
-    axes = triads(r[groups])
+    by_corner = corner_jacobians(layout.points_mm[groups])
     result = np.zeros((len(groups), 6, len(layout), 3))
-    for g, (j1, j2, j3) in enumerate(groups):
-        e1, e2, e3 = axes[g].T
-        base = np.linalg.norm(r[j1] - r[j2])
-        along, height = (r[j2] - r[j3]) @ e1, (r[j2] - r[j3]) @ e2
-        # Rotation components about e3, e2 (both from m_j1 - m_j2), then about e1.
-        about3 = {j1: e2 / base, j2: -e2 / base, j3: np.zeros(3)}
-        about2 = {j1: -e3 / base, j2: e3 / base, j3: np.zeros(3)}
-        normal = {j1: np.zeros(3), j2: e3, j3: -e3}
-        for j in (j1, j2, j3):
-            about1 = (normal[j] + along * about2[j]) / height
-            result[g, 3:, j] = (
-                np.outer(e1, about1) + np.outer(e2, about2[j]) + np.outer(e3, about3[j])
-            )
-        # Eq. (18): p = m_j1 - R r_j1
-        result[g, :3] = np.einsum("ab,bnc->anc", skew(r[j1]), result[g, 3:])
-        result[g, :3, j1] += np.eye(3)
+    np.put_along_axis(result, groups[:, None, :, None], by_corner, axis=2)
     return result
+
+
+def corner_jacobians(corners_mm: ArrayLike) -> Array:
+    """Derivative of one group's pose by the centres of its own three balls.
+
+    Parameters
+    ----------
+    corners_mm : array_like, shape (..., 3, 3)
+        Places of j1, j2, j3 as rows, ring frame, mm; leading axes are a batch of groups.
+
+    Returns
+    -------
+    ndarray, shape (..., 6, 3, 3)
+        Rows are ξ as in `group_jacobians`, then the ball and its displacement, ring frame, mm.
+
+    Notes
+    -----
+    Source: Eq. (18), (21), (22), by hand. Departs: as `group_jacobians`.
+    """
+    r = np.asarray(corners_mm, float)
+    axes = triads(r)
+    e1, e2, e3 = np.moveaxis(axes, -1, 0)
+    first, second = r[..., 0, :] - r[..., 1, :], r[..., 1, :] - r[..., 2, :]
+    base = np.linalg.norm(first, axis=-1)[..., None]
+    along = np.sum(second * e1, axis=-1)[..., None, None]
+    height = np.sum(second * e2, axis=-1)[..., None, None]
+    zero = np.zeros_like(e1)
+    # Rotation components about e3, e2 (both from m_j1 - m_j2), then about e1.
+    about3 = np.stack([e2, -e2, zero], axis=-2) / base[..., None]
+    about2 = np.stack([-e3, e3, zero], axis=-2) / base[..., None]
+    about1 = (np.stack([zero, e3, -e3], axis=-2) + along * about2) / height
+    about = np.stack([about1, about2, about3], axis=-3)
+    rotation = np.einsum("...ag,...gnc->...anc", axes, about)
+    # Eq. (18): p = m_j1 - R r_j1
+    position = np.einsum("...ab,...bnc->...anc", skew(r[..., 0, :]), rotation)
+    position[..., :, 0, :] += np.eye(3)
+    return np.concatenate([position, rotation], axis=-3)
 
 
 def group_jacobian(layout: MarkerLayout) -> Array:
