@@ -6,15 +6,17 @@ import os
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from hexafix.errors import Fault, ImageRefused, InputError
+from hexafix.errors import Fault, ImageRefused, InputError, MissingLibrary
 from hexafix.imaging.dicom_header import NotAnImage, SliceHeader, read_headers
+from hexafix.imaging.header_words import shown_image_type, shown_modality
 from hexafix.imaging.hounsfield import faults_of_values
-from hexafix.imaging.slice_stack import arrange, listed
+from hexafix.imaging.pixel_data import faults_of_length
+from hexafix.imaging.slice_stack import TILT_TOLERANCE_DEG, arrange, listed
 from hexafix.progress import Progress, silent
 
 SECONDARY_CAPTURE = "1.2.840.10008.5.1.4.1.1.7"
@@ -27,7 +29,11 @@ class SeriesSummary:
 
     Attributes
     ----------
-    series_instance_uid, modality : str
+    number : int
+        Place in the list, from 1.
+    series_instance_uid : str
+        Shown only where the user asks for it: it leads to the patient in the hospital's archive.
+    modality : str
     image_type : tuple of str
     slices : int
         Number of slices (frames) that would be read.
@@ -37,12 +43,15 @@ class SeriesSummary:
         Between columns, between rows, between slices; None where the header lacks it.
     orientation : str
         ``axial``, ``coronal``, ``sagittal``, ``oblique`` or ``unknown``.
+    tilt_deg : float or None
+        Angle between the slice normal and the line of slice origins; None where there is no line.
     excluded : str or None
         Why the series can never be the volume (localizer, secondary capture, ...).
     faults : tuple of Fault
         What would make reading it be refused, as far as headers tell.
     """
 
+    number: int
     series_instance_uid: str
     modality: str
     image_type: tuple[str, ...]
@@ -50,6 +59,7 @@ class SeriesSummary:
     size_ij: tuple[int, int]
     spacing_mm: tuple[float, float, float] | None
     orientation: str
+    tilt_deg: float | None
     excluded: str | None
     faults: tuple[Fault, ...] = ()
 
@@ -63,6 +73,8 @@ class SeriesSummary:
             f"{self.modality or 'no modality'}, {self.slices} slices of "
             f"{self.size_ij[0]} x {self.size_ij[1]}, {spacing}, {self.orientation}"
         )
+        if self.tilt_deg is not None and self.tilt_deg > TILT_TOLERANCE_DEG:
+            text += f", tilted by {self.tilt_deg:.2f} deg"
         return text + (f", left out: {self.excluded}" if self.excluded else "")
 
 
@@ -175,33 +187,47 @@ def summarise(slices: Iterable[SliceHeader]) -> tuple[SeriesSummary, ...]:
     groups: dict[tuple[str, str | None], list[SliceHeader]] = {}
     for item in slices:
         groups.setdefault((item.series_uid, exclusion(item)), []).append(item)
-    summaries = [_summary(reason, items) for (_, reason), items in groups.items()]
-    summaries.sort(key=lambda s: (s.excluded is not None, -s.slices, s.series_instance_uid))
-    return tuple(summaries)
+    found = [_summary(reason, items) for (_, reason), items in groups.items()]
+    found.sort(key=lambda s: (s.excluded is not None, -s.slices, s.series_instance_uid))
+    return tuple(replace(summary, number=place) for place, summary in enumerate(found, 1))
 
 
 def _summary(excluded: str | None, items: list[SliceHeader]) -> SeriesSummary:
     first = items[0]
     stack, faults = arrange(items)
     faults = faults_of_patients(items) + faults
-    spacing, orientation = None, "unknown"
+    if excluded is None:
+        faults += _faults_of_pixels(items)
+    spacing, orientation, tilt = None, "unknown", None
     if stack is not None:
         i, j, k = np.linalg.norm(stack.ijk_to_lps[:3, :3], axis=0)
         spacing = (float(i), float(j), float(k))
         normal = np.abs(stack.axes[2])
         names = ("sagittal", "coronal", "axial")
         orientation = names[int(normal.argmax())] if normal.max() > 0.999 else "oblique"
+        tilt = stack.tilt_deg if len(stack.slices) > 1 else None
     return SeriesSummary(
+        number=0,
         series_instance_uid=first.series_uid,
-        modality=first.modality,
-        image_type=first.image_type,
+        modality=shown_modality(first.modality),
+        image_type=shown_image_type(first.image_type),
         slices=len(items),
         size_ij=(first.columns, first.rows),
         spacing_mm=spacing,
         orientation=orientation,
+        tilt_deg=tilt,
         excluded=excluded,
         faults=tuple(faults),
     )
+
+
+def _faults_of_pixels(items: list[SliceHeader]) -> list[Fault]:
+    """What forbids to read the pixels, found without decoding any."""
+    faults = faults_of_values(items)
+    try:
+        return faults + faults_of_length(items)
+    except MissingLibrary as missing:
+        return faults + list(missing.faults)
 
 
 def choose(folder: DicomFolder, series_instance_uid: str | None) -> list[SliceHeader]:
@@ -237,7 +263,7 @@ def choose(folder: DicomFolder, series_instance_uid: str | None) -> list[SliceHe
             "the folder does not hold the series asked for as a usable image",
             value=f"{len(uids)} other series",
             where="image.series_instance_uid",
-            next_step="list the folder's series and choose one of them",
+            next_step="run `hexafix series FOLDER` and choose one of them",
         )
     return chosen
 
@@ -259,14 +285,14 @@ def _nothing_usable(folder: DicomFolder) -> list[Fault]:
 
 
 def _ambiguous(folder: DicomFolder) -> Fault:
-    # The UID is shown because it is what the user has to put into the case file.
-    lines = [f"[{s.series_instance_uid}: {s.description}]" for s in summarise(folder.slices)]
+    # Without the UIDs: they lead to the patient, and `hexafix series` shows them when asked.
     return Fault(
         "several-series",
         "the folder holds more than one series",
-        value="; ".join(lines),
+        value="; ".join(f"[{s.number}: {s.description}]" for s in summarise(folder.slices)),
         limit="1",
         where="image.series_instance_uid",
-        next_step="name the SeriesInstanceUID of the series to read",
+        next_step="run `hexafix series FOLDER` and give the SeriesInstanceUID of the one to read, "
+        "in the case or with --series",
         hazard="H05",
     )

@@ -18,6 +18,7 @@ from hexafix.imaging.dicom_series import (
     scan,
 )
 from hexafix.imaging.fingerprint import combine
+from hexafix.imaging.header_words import shown_modality
 from hexafix.imaging.hounsfield import faults_of_values
 from hexafix.imaging.pixel_data import (
     Pixels,
@@ -97,7 +98,7 @@ def _warnings(
         yield "lossy (H10): the pixels were compressed with loss"
     modality = stack.slices[0].modality
     if modality != "CT":
-        yield f"modality {modality or 'unknown'} (H10): the grey values are no Hounsfield units"
+        yield f"modality {shown_modality(modality) or 'unknown'} (H10): the grey values are no Hounsfield units"
     elif any(item.rescale_type not in (None, "HU", "US") for item in slices):
         yield "rescale type (H10): the header does not call the grey values Hounsfield units"
     if pixels.lowest_hu > _AIR_SEEN_HU:
