@@ -122,6 +122,23 @@ def phantom(
 
 
 @app.command
+def series(
+    folder: Annotated[Path, Parameter(help="A DICOM folder or file.")],
+    *,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """List the series of a DICOM folder with their SeriesInstanceUIDs, to choose one."""
+    from hexafix.cli.show import series_text
+    from hexafix.pipeline.series import series_document
+
+    with progress_bar(quiet=quiet) as progress:
+        document = series_document(folder, progress=progress)
+    print_json(document) if json else print(series_text(document))
+    return 0
+
+
+@app.command
 def markers(
     image: Annotated[Path, Parameter(help="DICOM folder, NRRD, NIfTI or MetaImage file.")],
     *,

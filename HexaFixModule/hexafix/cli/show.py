@@ -122,3 +122,24 @@ def verdict_text(verdict: dict[str, Any]) -> str:
     ]
     head = "verified" if verdict["verified"] else "NOT VERIFIED: do not use this export"
     return "\n".join([head, *lines])
+
+
+def series_text(document: dict[str, Any]) -> str:
+    """The series of a folder with their UIDs, what is left out and what would be refused."""
+    lines = []
+    for series in document["series"]:
+        words = " ".join(series["image_type"]) or "no image type"
+        lines += [
+            f"{series['number']}  {series['description']}, {words}",
+            f"   {series['series_instance_uid'] or 'no SeriesInstanceUID'}",
+        ]
+        lines += [
+            f"   refused: {'[' + fault['hazard'] + '] ' if fault['hazard'] else ''}"
+            f"{fault['message']}"
+            for fault in series["refused"]
+            if not series["left_out"]
+        ]
+    if document["patients"] > 1:
+        lines.append(f"warning: the images are of {document['patients']} different patients")
+    lines += [f"passed over: {row['files']} x {row['reason']}" for row in document["skipped"]]
+    return "\n".join(lines)

@@ -98,7 +98,8 @@ def _warnings(
         yield "lossy (H10): the pixels were compressed with loss"
     modality = stack.slices[0].modality
     if modality != "CT":
-        yield f"modality {shown_modality(modality) or 'unknown'} (H10): the grey values are no Hounsfield units"
+        shown = shown_modality(modality) or "unknown"
+        yield f"modality {shown} (H10): the grey values are no Hounsfield units"
     elif any(item.rescale_type not in (None, "HU", "US") for item in slices):
         yield "rescale type (H10): the header does not call the grey values Hounsfield units"
     if pixels.lowest_hu > _AIR_SEEN_HU:

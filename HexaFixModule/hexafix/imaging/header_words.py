@@ -1,5 +1,7 @@
-"""Code strings of a header that may be shown: a closed vocabulary, because vendors and sites write
-free text into these attributes too, and free text may name a patient (H51)."""
+"""Code strings of a header that may be shown: a closed vocabulary.
+
+Vendors and sites write free text into these attributes too, and free text may name a patient (H51).
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,20 @@ OTHER = "other"
 """Stands for every word that is not known."""
 
 _MODALITIES = frozenset(
-    "CT MR PT NM CR DX RG XA XC RF US MG OT SC SR SEG RTSTRUCT RTPLAN RTDOSE RTIMAGE RTRECORD REG "
-    "PR KO DOC ES SM IO PX BI BMD OPT OP FID PLAN IVUS ECG".split()
+    (
+        *("CT", "MR", "PT", "NM", "CR", "DX", "RG", "XA", "XC", "RF", "US", "MG", "OT", "SC", "SR"),
+        *("SEG", "RTSTRUCT", "RTPLAN", "RTDOSE", "RTIMAGE", "RTRECORD", "REG", "PR", "KO", "DOC"),
+        *("ES", "SM", "IO", "PX", "BI", "BMD", "OPT", "OP", "FID", "PLAN", "IVUS", "ECG"),
+    )
 )
 _IMAGE_TYPES = frozenset(
-    "ORIGINAL DERIVED MIXED PRIMARY SECONDARY AXIAL LOCALIZER SCOUT TOPOGRAM SURVIEW VOLUME MPR "
-    "REFORMATTED RESAMPLED AVERAGE AVERAGED MAX_IP MIN_IP MIP MINIP PROJECTION FILTERED ENERGY "
-    "VIRTUAL_MONOENERGETIC MONOENERGETIC DYNAMIC PERFUSION FLUOROSCOPY CONSTANT_ANGLE "
-    "STATIONARY HELIX SPIRAL SEQUENCE STANDARD SCREEN_SAVE DOSE_INFO NONE".split()
+    (
+        *("ORIGINAL", "DERIVED", "MIXED", "PRIMARY", "SECONDARY", "AXIAL", "LOCALIZER", "SCOUT"),
+        *("TOPOGRAM", "SURVIEW", "VOLUME", "MPR", "REFORMATTED", "RESAMPLED", "AVERAGE"),
+        *("MAX_IP", "MIN_IP", "MIP", "MINIP", "PROJECTION", "FILTERED", "ENERGY", "DYNAMIC"),
+        *("MONOENERGETIC", "VIRTUAL_MONOENERGETIC", "PERFUSION", "FLUOROSCOPY", "STANDARD"),
+        *("CONSTANT_ANGLE", "STATIONARY", "HELIX", "SPIRAL", "SEQUENCE", "SCREEN_SAVE", "NONE"),
+    )
 )
 
 
