@@ -88,7 +88,7 @@ def ball_share(ball: ExactBall, grid: Grid, i: range, j: range, k: range) -> NDA
     square = np.einsum("ni,ni->n", near, near)
     radii = np.arange(max(0.0, ball.radius_mm - 2 * reach), ball.radius_mm + 2 * reach, TABLE_MM)
     table = blurred_ball(radii, radius_mm=ball.radius_mm, sigma_mm=grid.psf_sigma_mm)
-    axes = grid.ijk_to_lps[:3, :3] / spacing
+    axes = grid.axes
     rules = [nodes_along(float(w), grid.psf_sigma_mm) for w in widths]
     total = np.zeros(len(near))
     for u, wu in zip(*rules[0], strict=True):

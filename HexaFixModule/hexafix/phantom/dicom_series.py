@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
@@ -32,6 +34,7 @@ def write_dicom_series(
     *,
     identity: str,
     psf_note: str = "",
+    header: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> str:
     """Write one file per slice; the file names are not in slice order.
@@ -46,6 +49,8 @@ def write_dicom_series(
         Decides the UIDs together with the voxels: the same input gives the same bytes.
     psf_note : str
         Convolution kernel's name in the header.
+    header : mapping of str to value, optional
+        Further elements of every slice, by DICOM keyword; they replace the usual ones.
     progress : Progress
 
     Returns
@@ -58,6 +63,8 @@ def write_dicom_series(
     digest.update(volume.ijk_to_lps.tobytes())
     root = digest.hexdigest()
     template = _template(volume, root, psf_note)
+    for keyword, value in (header or {}).items():
+        setattr(template, keyword, value)
     affine = volume.ijk_to_lps
     normal = volume.direction[:, 2]
     slices = volume.size_ijk[2]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hexafix.geometry import Pose
+from hexafix.phantom.posture import scanner_axes
 from hexafix.phantom.scene import Scene
 from hexafix.phantom.solids import Array, Solid, cylinder, slab_box
 from hexafix.phantom.spec import PhantomSpec
@@ -23,7 +24,7 @@ def limb_solids(spec: PhantomSpec, scene: Scene) -> list[Solid]:
     """Table, soft tissue and bone in painting order."""
     solids: list[Solid] = []
     if spec.table:
-        solids.append(_table(scene))
+        solids.append(_table(spec, scene))
     if spec.limb:
         solids.append(_soft_tissue(spec, scene))
         for upper in (True, False):
@@ -33,10 +34,11 @@ def limb_solids(spec: PhantomSpec, scene: Scene) -> list[Solid]:
     return solids
 
 
-def _table(scene: Scene) -> Solid:
-    """Carbon table with a foam core, behind (posterior of) the frame."""
+def _table(spec: PhantomSpec, scene: Scene) -> Solid:
+    """Carbon table with a foam core, under the frame as the patient lies."""
     middle = 0.5 * (scene.ring_a.position_mm + scene.ring_b.position_mm)
-    pose = Pose(np.eye(3), middle + np.array([0.0, 138.0, 0.0]))
+    axes = scanner_axes(spec.patient_position)
+    pose = Pose(axes, middle + axes @ np.array([0.0, 138.0, 0.0]))
     return slab_box(pose, (215.0, 9.0, LONGEST_MM), ((0.0, 80.0), (1.8, -880.0)))
 
 

@@ -88,7 +88,7 @@ def make_phantom(
         slice_thickness_mm=spec.thickness_mm,
         laterality=spec.side[0].upper(),
         body_part=BODY_PART.get(spec.bone, "EXTREMITY"),
-        patient_position="HFS",
+        patient_position=spec.patient_position,
     )
     volume = Volume(voxels, scene.grid.ijk_to_lps, source)
     return Phantom(spec, volume, truth, case_document(spec, scene, "ct"))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hexafix.geometry import Pose, matrix_from_xyz_fixed
 from hexafix.kinematics import strut_lengths
+from hexafix.phantom.posture import stack_axes
 from hexafix.phantom.solids import Grid
 from hexafix.phantom.spec import PhantomSpec
 
@@ -122,14 +123,24 @@ def _extent(spec: PhantomSpec, ring_a: Pose, ring_b: Pose) -> NDArray[np.float64
 
 def _grid(spec: PhantomSpec, middle_mm: NDArray[np.float64]) -> Grid:
     """Voxel grid whose header values survive the 16 characters of a DICOM decimal string."""
-    axes = np.round(matrix_from_xyz_fixed(np.asarray(spec.image_angles_rad)), 13)
+    turn = matrix_from_xyz_fixed(np.asarray(spec.image_angles_rad))
+    turn = turn @ stack_axes(spec.patient_position, spec.slice_plane)
+    tilt = spec.gantry_tilt_rad
+    if tilt:
+        turn = turn @ matrix_from_xyz_fixed(np.array([tilt, 0.0, 0.0]))
+    axes = np.round(turn, 13)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     axes[:, 2] /= np.linalg.norm(axes[:, 2])
+    if tilt:
+        # the table goes on as if the gantry stood straight
+        axes[:, 2] += np.tan(tilt) * axes[:, 1]
+    if spec.slices_reversed:
+        axes[:, 2] *= -1.0
     center = middle_mm if spec.image_center_mm is None else np.asarray(spec.image_center_mm)
     affine = np.eye(4)
     affine[:3, :3] = axes * np.array(spec.spacing_mm)
     affine[:3, 3] = np.round(center - affine[:3, :3] @ ((np.array(spec.size_ijk) - 1) / 2.0), 4)
-    return Grid(affine, spec.size_ijk, spec.thickness_mm, spec.psf_sigma_mm)
+    return Grid(affine, spec.size_ijk, spec.thickness_mm, spec.psf_sigma_mm, tilt)
 
 
 def distance_to_struts_mm(scene: Scene, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -48,21 +48,39 @@ class Grid:
     Attributes
     ----------
     ijk_to_lps : ndarray, shape (4, 4)
+        The third column is the step from slice to slice; with a tilted gantry it does not run
+        along the slices' normal.
     size_ijk : tuple of int
+        Number of voxels along i, j, k.
     thickness_mm : float
-        Width of the slice profile.
+        Width of the slice profile, along the slices' normal.
     psf_sigma_mm : float
+    gantry_tilt_rad : float
+        Angle between slice step and slice normal.
     """
 
     ijk_to_lps: NDArray[np.float64]
     size_ijk: tuple[int, int, int]
     thickness_mm: float
     psf_sigma_mm: float
+    gantry_tilt_rad: float = 0.0
 
     @property
     def spacing_mm(self) -> NDArray[np.float64]:
-        """Voxel pitch along i, j, k, mm."""
-        return np.linalg.norm(self.ijk_to_lps[:3, :3], axis=0)
+        """Voxel pitch along i, j and the slices' normal, mm."""
+        spacing = np.linalg.norm(self.ijk_to_lps[:3, :3], axis=0)
+        if self.gantry_tilt_rad:
+            spacing[2] *= np.cos(self.gantry_tilt_rad)
+        return spacing
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Unit vectors of i, j and the slices' normal (the way the slices go on), columns."""
+        axes = self.ijk_to_lps[:3, :3] / np.linalg.norm(self.ijk_to_lps[:3, :3], axis=0)
+        if self.gantry_tilt_rad:
+            normal = np.cross(axes[:, 0], axes[:, 1])
+            axes[:, 2] = normal * np.sign(normal @ axes[:, 2])
+        return axes
 
 
 def paint(slab: Array, first_slice: int, solid: Solid, grid: Grid) -> None:
@@ -188,11 +206,14 @@ def local_coordinates(
     i, j, k : range
         The window.
     k_offset : float
-        Added to k, in slices.
+        Shift along the slices' normal, in pitches.
     grid : Grid
     """
     to_local = pose.rotation.T @ grid.ijk_to_lps[:3, :3]
     start = pose.rotation.T @ (grid.ijk_to_lps[:3, 3] - pose.position_mm)
+    if grid.gantry_tilt_rad and k_offset:
+        aside = grid.axes[:, 2] * grid.spacing_mm[2] - grid.ijk_to_lps[:3, 2]
+        start = start + pose.rotation.T @ aside * k_offset
     along_i, along_j, along_k = np.array(i, float), np.array(j, float), np.array(k, float)
     axes = []
     for row, constant in zip(to_local, start, strict=True):

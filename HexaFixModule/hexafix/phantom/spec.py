@@ -9,6 +9,7 @@ import numpy as np
 from hexafix.errors import Fault, InputError
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, shipped_fixator
+from hexafix.phantom.posture import PATIENT_POSITIONS, SLICE_PLANES
 
 CORRECTIONS = ("target-pose", "fragment-motion", "landmarks", "deformity")
 INSTALLATION_SIGMA_MM = 0.4 / 6
@@ -17,6 +18,8 @@ AIR_HU = -1000.0
 LOWEST_HU = -1024
 ALUMINIUM_HU, CARBON_HU, STEEL_HU = 2300.0, 150.0, 8000.0
 RING_HU = {"aluminium": ALUMINIUM_HU, "carbon": CARBON_HU}
+STEEPEST_TILT_RAD = 0.6
+"""No gantry leans further."""
 
 
 def _pose(*numbers: float) -> Pose:
@@ -54,7 +57,17 @@ class PhantomSpec:
     slice_thickness_mm : float or None
         Width of the slice profile (box); None: the pitch along k.
     image_angles_rad : tuple of float
-        X-Y-Z fixed angles of the axes i, j, k in LPS.
+        X-Y-Z fixed angles of the axes i, j, k in LPS; a turn on top of what `patient_position`
+        and `slice_plane` say.
+    patient_position : str
+        DICOM's PatientPosition, ``HFS`` to ``FFDL``; decides where the table is too.
+    slice_plane : str
+        ``axial`` as scanned, or reformatted ``coronal`` or ``sagittal``.
+    slices_reversed : bool
+        Whether the slices are stored against the direction of rows × columns.
+    gantry_tilt_rad : float
+        Slices turned about their rows while the table moves on straight, so that each is shifted
+        against the one before; the pitch along k is that of the slice planes.
     image_center_mm : tuple of float or None
         LPS point in the middle of the volume; None: in the middle of the frame.
     fixator : Fixator
@@ -107,6 +120,10 @@ class PhantomSpec:
     slice_thickness_mm: float | None = None
     image_angles_rad: tuple[float, float, float] = (0.03, -0.02, 0.05)
     image_center_mm: tuple[float, float, float] | None = None
+    patient_position: str = "HFS"
+    slice_plane: str = "axial"
+    slices_reversed: bool = False
+    gantry_tilt_rad: float = 0.0
     fixator: Fixator = field(default_factory=shipped_fixator)
     ring_b_pose: Pose = field(default_factory=lambda: _pose(31.7, -212.4, 846.3, 2.5, -3.5, -84.0))
     mechanism_pose: Pose = field(default_factory=lambda: _pose(6.5, -5.2, 180.5, 4.0, -5.5, 6.0))
@@ -155,6 +172,8 @@ def _faults(spec: PhantomSpec) -> list[tuple[str, str, str]]:
         "correction": CORRECTIONS,
         "moving": ("proximal", "distal"),
         "side": ("left", "right"),
+        "patient_position": PATIENT_POSITIONS,
+        "slice_plane": SLICE_PLANES,
     }
     for name, allowed in words.items():
         if getattr(spec, name) not in allowed:
@@ -179,6 +198,11 @@ def _faults(spec: PhantomSpec) -> list[tuple[str, str, str]]:
         found.append(("strut_typo names no strut", str(spec.strut_typo[0]), "1 to 6"))
     if set(spec.proximal.numbers) & set(spec.distal.numbers):
         found.append(("a ball number is on both rings", "numbers", "each number once"))
+    if not abs(spec.gantry_tilt_rad) <= STEEPEST_TILT_RAD:
+        value = f"{np.degrees(spec.gantry_tilt_rad):.1f} deg"
+        found.append(("the gantry leans too far", value, f"{np.degrees(STEEPEST_TILT_RAD):.1f}"))
+    if spec.gantry_tilt_rad and spec.slice_plane != "axial":
+        found.append(("a reformatted stack has no gantry tilt", spec.slice_plane, "axial"))
     if spec.seed < 0:
         found.append(("seed is negative", str(spec.seed), "≥ 0"))
     return found

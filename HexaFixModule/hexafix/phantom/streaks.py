@@ -40,7 +40,7 @@ def streaks_of(spec: PhantomSpec, scene: Scene) -> list[Streak]:
     """Bands between steel joints and marker balls that lie in nearly the same slices."""
     if spec.streak_hu <= 0.0:
         return []
-    normal = scene.grid.ijk_to_lps[:3, 2] / scene.grid.spacing_mm[2]
+    normal = scene.grid.axes[:, 2]
     metal = np.concatenate(
         [scene.joints_a_mm, scene.joints_b_mm, np.array(list(scene.balls_mm.values()))]
     )
@@ -77,7 +77,7 @@ def add_streak(slab: Array, first_slice: int, streak: Streak, grid: Grid) -> Non
         return
     i, j, k = ranges
     x, y, z = local_coordinates(pose, i, j, k, 0.0, grid)
-    normal = pose.rotation.T @ (grid.ijk_to_lps[:3, 2] / grid.spacing_mm[2])
+    normal = pose.rotation.T @ grid.axes[:, 2]
     flat = np.hypot(normal[0], normal[1])
     deep = (normal[0] * x + normal[1] * y) / np.float32(flat)
     across = (normal[1] * x - normal[0] * y) / np.float32(flat * streak.width_mm)

@@ -49,6 +49,7 @@ def truth_document(spec: PhantomSpec, scene: Scene, decoys: list[dict[str, Any]]
             "ijk_to_lps": numbers(scene.grid.ijk_to_lps),
             "psf_sigma_mm": spec.psf_sigma_mm,
             "noise_hu": spec.noise_hu,
+            **_posture(spec),
         },
         "ball_diameter_mm": spec.ball_diameter_mm,
         "balls": [
@@ -92,12 +93,24 @@ def truth_document(spec: PhantomSpec, scene: Scene, decoys: list[dict[str, Any]]
     }
 
 
+def _posture(spec: PhantomSpec) -> dict[str, Any]:
+    """How the scan departs from a plain one: head first, supine, axial, upright."""
+    plain = PhantomSpec()
+    names = ("patient_position", "slice_plane", "slices_reversed")
+    told = {name: getattr(spec, name) for name in names}
+    told = {name: value for name, value in told.items() if value != getattr(plain, name)}
+    if spec.gantry_tilt_rad:
+        told["gantry_tilt_deg"] = float(np.degrees(spec.gantry_tilt_rad))
+    return told
+
+
 def in_image(center_mm: np.ndarray, radius_mm: float, scene: Scene) -> bool:
     """Whether a ball with its blur lies wholly in the volume."""
     grid = scene.grid
     inverse = np.linalg.inv(grid.ijk_to_lps)
     ijk = inverse[:3, :3] @ center_mm + inverse[:3, 3]
-    reach = (radius_mm + 3.0 * grid.psf_sigma_mm + 0.5 * grid.thickness_mm) / grid.spacing_mm
+    reach = radius_mm + 3.0 * grid.psf_sigma_mm + 0.5 * grid.thickness_mm
+    reach = reach * np.linalg.norm(inverse[:3, :3], axis=1)
     return bool(np.all(ijk >= reach) and np.all(ijk <= np.array(grid.size_ijk) - 1 - reach))
 
 

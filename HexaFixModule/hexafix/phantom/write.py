@@ -6,10 +6,13 @@ import json
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from hexafix.errors import InputError
 from hexafix.imaging import Volume
 from hexafix.phantom.dicom_series import write_dicom_series
 from hexafix.phantom.make import Phantom
+from hexafix.phantom.spec import PhantomSpec
 from hexafix.progress import Progress, silent
 
 ImageFormat = Literal["dicom", "nrrd", "nifti", "metaimage"]
@@ -66,16 +69,38 @@ def write_phantom(
             phantom.volume,
             folder / "ct",
             identity=json.dumps(phantom.truth, sort_keys=True),
+            header=dicom_header(phantom.spec),
             progress=progress,
         )
         case["image"]["path"] = "ct"
     else:
+        if phantom.spec.gantry_tilt_rad:
+            raise InputError.of(
+                "tilt-needs-dicom",
+                "only DICOM slices can hold a tilted gantry",
+                value=image_format,
+                limit="dicom",
+            )
         case["image"]["path"] = FILE_NAMES[image_format]
         write_image_file(phantom.volume, folder / FILE_NAMES[image_format])
         progress("writing the image", 1.0)
     _write_json(folder / "truth.json", phantom.truth)
     _write_json(folder / "case.json", case)
     return folder / "case.json"
+
+
+def dicom_header(spec: PhantomSpec) -> dict[str, Any]:
+    """Header elements of a scan that is not plain.
+
+    GantryDetectorTilt gets the sign that one vendor writes and another contradicts: whoever
+    believes it instead of the positions shears the volume twice.
+    """
+    header: dict[str, Any] = {}
+    if spec.gantry_tilt_rad:
+        header["GantryDetectorTilt"] = f"{np.degrees(spec.gantry_tilt_rad):.1f}"
+    if spec.slice_plane != "axial":
+        header["ImageType"] = ["DERIVED", "SECONDARY", "REFORMATTED"]
+    return header
 
 
 def write_image_file(volume: Volume, path: Path) -> None:
