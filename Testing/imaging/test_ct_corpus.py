@@ -39,7 +39,7 @@ REFUSED = {
     "fo-dicom/GH1376.dcm": {"too-few-slices", "truncated-pixel-data"},
     "fo-dicom/GH342.dcm": {"no-usable-series"},
     "fo-dicom/GH177_D_CLUNIE_CT1_IVRLE_BigEndian_undefined_length.dcm": {"no-dicom-image"},
-    "crasher/sitk257_segfault_one_byte.dcm": {"no-geometry"},
+    "crasher/sitk257_segfault_one_byte.dcm": {"no-geometry", "bad-codestream"},
     "cornerstone_transfer_syntaxes/no-pixel-data.dcm": {"no-dicom-image"},
 }
 

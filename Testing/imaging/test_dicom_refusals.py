@@ -252,7 +252,13 @@ def test_impossible_bit_depths_are_refused(tmp_path, writer, grid):
 
 
 def test_corrupt_compressed_pixels_are_refused(tmp_path, writer, grid):
-    folder = writer.save(tmp_path, encapsulated(writer.slices(grid)), syntax=RLELossless)
+    items = writer.slices(grid)
+    for item in items:
+        # Two segments as they should be, but of runs that give far too many pixels.
+        header = np.array([2, 64, 66, *[0] * 13], "<u4").tobytes()
+        item.PixelData = encapsulate([header + b"\x81\0" * 2])
+        item["PixelData"].is_undefined_length = True
+    folder = writer.save(tmp_path, items, syntax=RLELossless)
     only(faults_of(folder), "corrupt-pixel-data", "H09")
 
 
@@ -345,9 +351,9 @@ def test_a_path_that_is_not_there_is_an_input_error(tmp_path):
 
 
 def test_a_deflated_bomb_is_not_inflated(tmp_path, writer, grid, syntaxes, monkeypatch):
-    from hexafix.imaging import dicom_header
+    from hexafix.imaging import header_file
 
     folder = writer.save(tmp_path, writer.slices(grid), syntax=syntaxes["deflated"])
-    monkeypatch.setattr(dicom_header, "_MAX_INFLATED", 100)
+    monkeypatch.setattr(header_file, "_MAX_INFLATED", 100)
     fault = faults_of(folder, InputError)["no-dicom-image"]
     assert "5 x deflated DICOM that inflates" in fault.value

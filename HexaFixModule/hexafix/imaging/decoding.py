@@ -5,10 +5,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import closing
+from functools import lru_cache
 from pathlib import Path
 
 from numpy.typing import NDArray
-from pydicom import dcmread
+from pydicom import FileDataset, dcmread
 from pydicom.pixels.decoders.base import get_decoder
 from pydicom.pixels.utils import pixel_array
 from pydicom.uid import UID
@@ -22,11 +23,13 @@ LOSSY_SYNTAXES = frozenset(
     "1.2.840.10008.1.2.4." + tail for tail in ("50", "51", "52", "53", "54", "55", "56", "81")
 )
 
-# The child's limits: Python and the codecs, then a whole file inflated and its frame in all stages.
+# The child's limits. Memory: Python and the codecs, the frame in all stages of its decoder, and a
+# deflated file as it is read, inflated and held. Time: for each frame by itself, so that a long
+# series cannot be taken for a hang; a tenth of the slowest codec's speed on a slow machine.
 _BASE_MEMORY = 2 << 30
-_BYTES_PER_PIXEL = 32
+_BYTES_PER_PIXEL = 64
 _BASE_SECONDS = 60.0
-_SECONDS_PER_SLICE = 2.0
+_PIXELS_PER_SECOND = 2e5
 
 
 def require_decoder(transfer_syntax: str) -> list[Fault]:
@@ -73,12 +76,13 @@ def decode_frames(slices: Sequence[SliceHeader]) -> Generator[NDArray]:
     """
     if not slices:
         return
-    largest = max(item.rows * item.columns * item.frames for item in slices)
+    largest = max(item.rows * item.columns for item in slices)
+    inflated = max(3 * (item.pixels.length or 0) for item in slices)
     results = run_isolated(
         "decode",
         [(str(item.path.resolve()), item.frame, item.pixels.transfer_syntax) for item in slices],
-        memory_bytes=_BASE_MEMORY + largest * _BYTES_PER_PIXEL,
-        seconds=_BASE_SECONDS + len(slices) * _SECONDS_PER_SLICE,
+        memory_bytes=_BASE_MEMORY + largest * _BYTES_PER_PIXEL + inflated,
+        seconds=_BASE_SECONDS + largest / _PIXELS_PER_SECOND,
     )
     with closing(results):
         for _, stored in results:
@@ -93,5 +97,11 @@ def decode_frame(path: Path, frame: int, transfer_syntax: str) -> NDArray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         # pydicom finds the pixels by file position, which a deflated file does not have.
-        source = dcmread(path) if transfer_syntax == DEFLATED else path
+        source = _inflated(path) if transfer_syntax == DEFLATED else path
         return pixel_array(source, index=frame, raw=True)
+
+
+@lru_cache(maxsize=1)
+def _inflated(path: Path) -> FileDataset:
+    """The whole data set, kept for the next frame of the same file."""
+    return dcmread(path)

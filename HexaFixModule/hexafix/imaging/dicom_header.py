@@ -7,7 +7,6 @@ to see whether all slices are of one patient: only a keyed hash of it is kept, i
 from __future__ import annotations
 
 import hashlib
-import math
 import secrets
 import struct
 import zlib
@@ -20,6 +19,13 @@ from pydicom import dcmread
 from pydicom.dataset import Dataset, FileDataset
 from pydicom.errors import InvalidDicomError
 from pydicom.tag import Tag
+
+from hexafix.imaging.header_file import (
+    BoundedFile,
+    NotAnImage,
+    inflate,
+    open_regular,
+)
 
 IMPLICIT_LITTLE = "1.2.840.10008.1.2"
 EXPLICIT_LITTLE = "1.2.840.10008.1.2.1"
@@ -35,7 +41,8 @@ _KEYWORDS = (
     *("Rows", "Columns", "NumberOfFrames", "SamplesPerPixel", "BitsAllocated", "BitsStored"),
     *("HighBit", "PixelRepresentation", "PixelPaddingValue", "PixelPaddingRangeLimit"),
     *("RescaleSlope", "RescaleIntercept", "RescaleType", "ModalityLUTSequence"),
-    *("LossyImageCompression", "SharedFunctionalGroupsSequence"),
+    *("PhotometricInterpretation", "LossyImageCompression", "ExtendedOffsetTable"),
+    "SharedFunctionalGroupsSequence",
     *("PerFrameFunctionalGroupsSequence", "PatientName", "PatientID", "PatientBirthDate"),
 )
 _TAGS = [Tag(keyword) for keyword in _KEYWORDS]
@@ -43,14 +50,16 @@ _TAG = dict(zip(_KEYWORDS, _TAGS, strict=True))
 _PIXEL_DATA = 0x7FE00010
 _PIXEL_TAGS = (_PIXEL_DATA, 0x7FE00008, 0x7FE00009)
 _UNDEFINED = 0xFFFFFFFF
-# A deflated header can blow up a thousandfold; no CT slice or multi-frame CT needs more than this.
-_MAX_INFLATED = 1 << 30
+_SIGNED: dict[int | None, bool] = {0: False, 1: True}
+_ITEMS = (b"\xfe\xff\x00\xe0", b"\xff\xfe\xe0\x00")
+_MAX_ITEMS = 400_000
+# Far above any CT: 8192 x 8192 pixels, and a frame for each 0.1 mm of a limb.
+_MAX_PIXELS = 1 << 26
+_MAX_FRAMES = 20_000
+# Beyond a kilometre there is no patient, and no scanner writes underscores as Python allows them.
+_LARGEST_MM = 1e6
 # A new key in every process: outside of it the hashes of patients tell nothing.
 _PATIENT_KEY = secrets.token_bytes(16)
-
-
-class NotAnImage(Exception):
-    """The file holds no image slice; the text is the reason shown to the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +70,16 @@ class PixelFormat:
     ----------
     transfer_syntax : str
     bits_allocated, bits_stored, high_bit, samples : int
-    signed : bool
+    signed : bool or None
+        None when the header does not say.
+    photometric : str
+    extended_offsets : bool
+        Whether an extended offset table places the frames.
     padding, padding_limit : int or None
         PixelPaddingValue and PixelPaddingRangeLimit, reduced to `bits_allocated` bits.
     offset, length : int or None
-        Where the pixel bytes lie in the file; length None when they are encapsulated, both None
-        when there are no pixels or the whole file is deflated.
+        Where the pixel bytes lie in the file, or in what a deflated file inflates to; length None
+        when they are encapsulated, both None when there are no pixels.
     available : int
         Bytes present from `offset` to the end of the file.
     """
@@ -75,7 +88,9 @@ class PixelFormat:
     bits_allocated: int
     bits_stored: int
     high_bit: int
-    signed: bool
+    signed: bool | None
+    photometric: str
+    extended_offsets: bool
     samples: int
     padding: int | None
     padding_limit: int | None
@@ -141,14 +156,16 @@ def read_headers(path: Path) -> list[SliceHeader]:
         If the file is not DICOM, cannot be parsed or holds no image; the text has the reason.
     """
     try:
-        with path.open("rb") as file:
-            head = file.read(132)
-            if len(head) == 0:
-                raise NotAnImage("empty file")
-            if head[128:] != b"DICM":
+        file, size = open_regular(path)
+        with file:
+            head = file.read(1024)
+            if head[128:132] != b"DICM":
                 raise NotAnImage("not DICOM (no preamble)")
+            if DEFLATED.encode() in head:
+                plain, size = inflate(file)
+                return _parse(path, plain, size, DEFLATED)
             file.seek(0)
-            return _parse(path, file)
+            return _parse(path, file, size)
     except OSError as error:
         # pydicom raises OSError too, with the tag it wanted: only our wording goes out.
         reason = "DICOM header ends early or is corrupt"
@@ -161,27 +178,25 @@ def read_headers(path: Path) -> list[SliceHeader]:
         raise NotAnImage("DICOM header is corrupt") from error
 
 
-def _parse(path: Path, file: BinaryIO) -> list[SliceHeader]:
-    size = path.stat().st_size
-    if DEFLATED.encode() in file.read(1024):
-        _check_inflated_size(file)
-    file.seek(0)
-    dataset = dcmread(file, stop_before_pixels=True, specific_tags=_TAGS)
-    syntax = str(dataset.file_meta.get("TransferSyntaxUID", "") or "")
+def _parse(path: Path, file: BinaryIO, size: int, syntax: str | None = None) -> list[SliceHeader]:
+    """The headers of an open file; `syntax` where it is not the one that the file names."""
+    bounded = cast(BinaryIO, BoundedFile(file))
+    dataset = dcmread(bounded, stop_before_pixels=True, specific_tags=_TAGS)
+    syntax = syntax or str(dataset.file_meta.get("TransferSyntaxUID", "") or "")
     if not syntax:
         raise NotAnImage("DICOM without a transfer syntax")
-    if syntax == DEFLATED:
-        offset, length = None, None
-    else:
-        offset, length = _locate_pixels(file, dataset)
+    offset, length = _locate_pixels(bounded, dataset)
     rows, columns = _integer(dataset, "Rows"), _integer(dataset, "Columns")
     if not rows or not columns:
         if dataset.file_meta.get("MediaStorageSOPClassUID") == MEDIA_DIRECTORY:
             raise NotAnImage("DICOM media directory")
         raise NotAnImage("DICOM object without an image")
-    frames = int(_text(dataset, "NumberOfFrames") or 1)
-    if frames < 1:
-        raise NotAnImage("DICOM header is corrupt")
+    if rows * columns > _MAX_PIXELS:
+        raise NotAnImage("DICOM image with more pixels than any CT slice")
+    counted = _text(dataset, "NumberOfFrames") or "1"
+    frames = int(counted) if counted.isascii() and counted.isdigit() else 0
+    if not 1 <= frames <= _MAX_FRAMES:
+        raise NotAnImage("DICOM image with an impossible number of frames")
     bits = _integer(dataset, "BitsAllocated") or 0
     stored = _integer(dataset, "BitsStored") or bits
     high = _integer(dataset, "HighBit")
@@ -190,7 +205,9 @@ def _parse(path: Path, file: BinaryIO) -> list[SliceHeader]:
         bits_allocated=bits,
         bits_stored=stored,
         high_bit=stored - 1 if high is None else high,
-        signed=_integer(dataset, "PixelRepresentation") == 1,
+        signed=_SIGNED.get(_integer(dataset, "PixelRepresentation")),
+        photometric=_text(dataset, "PhotometricInterpretation") or "",
+        extended_offsets=_raw(dataset, "ExtendedOffsetTable") is not None,
         samples=_integer(dataset, "SamplesPerPixel") or 1,
         padding=_integer(dataset, "PixelPaddingValue"),
         padding_limit=_integer(dataset, "PixelPaddingRangeLimit"),
@@ -200,21 +217,6 @@ def _parse(path: Path, file: BinaryIO) -> list[SliceHeader]:
     )
     common = _common(dataset, path, frames, rows, columns, pixels)
     return _frames(dataset, common, frames)
-
-
-def _check_inflated_size(file: BinaryIO) -> None:
-    """Refuse a deflated data set that inflates beyond reason, in bounded memory."""
-    file.seek(0)
-    raw = file.read()
-    # Group length (0002,0000) UL stands first in the meta header: it says where the data begin.
-    meta_length = struct.unpack_from("<L", raw, 140)[0] if raw[132:136] == b"\2\0\0\0" else 0
-    inflater = zlib.decompressobj(-zlib.MAX_WBITS)
-    total, data = 0, raw[144 + meta_length :]
-    while data and not inflater.eof:
-        total += len(inflater.decompress(data, 1 << 20))
-        data = inflater.unconsumed_tail
-        if total > _MAX_INFLATED:
-            raise NotAnImage("deflated DICOM that inflates to more than 1 GB")
 
 
 def _locate_pixels(file: BinaryIO, dataset: FileDataset) -> tuple[int | None, int | None]:
@@ -262,15 +264,17 @@ def _text(dataset: Dataset, keyword: str) -> str | None:
 
 
 def _numbers(dataset: Dataset, keyword: str, count: int) -> tuple[float, ...] | None:
-    """`count` finite decimals, None where the attribute is absent, incomplete or not a number."""
+    """`count` plausible decimals, None where the attribute is absent, incomplete or no number."""
     text = _text(dataset, keyword)
-    if text is None:
+    if text is None or "_" in text:  # Python would read 1_0 as ten
         return None
     try:
         values = tuple(float(part) for part in text.split("\\"))
     except ValueError:
         return None
-    return values if len(values) == count and all(map(math.isfinite, values)) else None
+    if len(values) != count or not all(-_LARGEST_MM <= value <= _LARGEST_MM for value in values):
+        return None
+    return values
 
 
 def _number(dataset: Dataset, keyword: str) -> float | None:
@@ -284,10 +288,9 @@ def _integer(dataset: Dataset, keyword: str) -> int | None:
     if element is None:
         return None
     if isinstance(element.value, bytes):
-        if not element.value:
+        if len(element.value) != 2:
             return None
-        order = "little" if element.is_little_endian else "big"
-        return int.from_bytes(element.value[:2], order)
+        return int.from_bytes(element.value, "little" if element.is_little_endian else "big")
     return None if element.value is None else int(element.value)
 
 
@@ -342,6 +345,10 @@ def _frames(dataset: FileDataset, common: dict[str, Any], frames: int) -> list[S
             # One position at the top level cannot place several frames.
             common |= {"position_mm": None}
         return [SliceHeader(frame=index, **common) for index in range(frames)]
+    for keyword in ("PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsSequence"):
+        raw = _raw(dataset, keyword)
+        if isinstance(raw, bytes) and sum(map(raw.count, _ITEMS)) > _MAX_ITEMS:
+            raise NotAnImage("DICOM with more functional groups than any CT")
     per_frame = list(dataset.PerFrameFunctionalGroupsSequence)
     shared = list(dataset.get("SharedFunctionalGroupsSequence") or [])
     if len(per_frame) != frames:

@@ -7,11 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.errors import Fault
-from hexafix.imaging.dicom_header import SliceHeader
+from hexafix.errors import Fault, ImageRefused
+from hexafix.imaging.dicom_header import EXPLICIT_BIG, SliceHeader
 
 AIR_HU = -1024
 _INT16 = np.iinfo(np.int16)
+
+
+# Dense metal on an extended scale stays below 100 000 HU.
+LARGEST_HU = 1e6
 
 
 class NeedsFloat(Exception):
@@ -54,7 +58,7 @@ def faults_of_values(slices: Sequence[SliceHeader]) -> list[Fault]:
         faults.append(
             Fault(
                 "pixel-format",
-                "pixels are not stored as 8, 16 or 32 bit grey values",
+                "pixels are not stored as 8, 16 or 32 bit grey values, signed or unsigned",
                 value=f"{odd} of {len(slices)} slices",
                 limit="0",
                 next_step="export the original CT series",
@@ -68,6 +72,10 @@ def _format_ok(item: SliceHeader) -> bool:
     pixels = item.pixels
     return (
         pixels.samples == 1
+        and pixels.signed is not None
+        and pixels.photometric in ("MONOCHROME1", "MONOCHROME2")
+        # Eight-bit pixels of big-endian words change their order with the VR.
+        and not (pixels.transfer_syntax == EXPLICIT_BIG and pixels.bits_allocated == 8)
         and pixels.bits_allocated in (8, 16, 32)
         and 1 <= pixels.bits_stored <= pixels.bits_allocated
         and pixels.bits_stored - 1 <= pixels.high_bit < pixels.bits_allocated
@@ -94,12 +102,23 @@ def convert(stored: NDArray, item: SliceHeader, out: NDArray) -> None:
     ------
     NeedsFloat
         If `out` is int16 and would lose something.
+    ImageRefused
+        If slope and intercept lead beyond anything that could be Hounsfield units (H10).
     """
     slope = 1.0 if item.slope is None else item.slope
     intercept = 0.0 if item.intercept is None else item.intercept
     _flatten_padding(stored, item, slope, intercept)
     _keep_stored_bits(stored, item)
     low, high = sorted(slope * float(end) + intercept for end in (stored.min(), stored.max()))
+    if max(abs(low), abs(high)) > LARGEST_HU:
+        raise ImageRefused.of(
+            "impossible-values",
+            "RescaleSlope and RescaleIntercept give impossible grey values",
+            value=f"{low:.3g} to {high:.3g} HU",
+            limit=f"±{LARGEST_HU:.0e} HU",
+            next_step="export the original CT series",
+            hazard="H10",
+        )
     if out.dtype == np.float32:
         out[...] = slope * stored.astype(np.float64) + intercept
         return

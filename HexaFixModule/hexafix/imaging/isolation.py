@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Timer
 from typing import IO, Any
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from hexafix.errors import ImageRefused
 
 _PACKAGE_PARENT = Path(__file__).resolve().parents[2]
+_MAX_LINE = 1 << 20
 # Each thread of a library reserves address space, which the child's limit would count.
 _ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
@@ -42,7 +45,8 @@ def run_isolated(
     memory_bytes : int
         Address space the child may use.
     seconds : float
-        Wall clock after which the child is killed.
+        Wall clock that the child may take for each result, and for coming to its end, before it
+        is killed. What the caller does between results does not count.
 
     Yields
     ------
@@ -63,45 +67,71 @@ def run_isolated(
         stderr=subprocess.DEVNULL,
         env=_environment(),
     )
+    with process:
+        try:
+            with _killed_after(seconds, process):
+                _send(process, json.dumps(request).encode())
+            while True:
+                with _killed_after(seconds, process):
+                    result = _receive(process, memory_bytes)
+                if result is None:
+                    return
+                yield result
+        finally:
+            process.kill()
+
+
+@contextmanager
+def _killed_after(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
     timer = Timer(seconds, process.kill)
     timer.daemon = True
     timer.start()
     try:
-        with process:
-            try:
-                yield from _results(process, json.dumps(request).encode(), memory_bytes)
-            finally:
-                process.kill()
+        yield
     finally:
         timer.cancel()
 
 
-def _results(
-    process: subprocess.Popen[bytes], request: bytes, memory_bytes: int
-) -> Generator[tuple[dict[str, Any], NDArray]]:
+def _send(process: subprocess.Popen[bytes], request: bytes) -> None:
     assert process.stdin is not None
-    assert process.stdout is not None
     try:
         process.stdin.write(request)
         process.stdin.close()
     except OSError as error:
         raise _died() from error
-    while line := process.stdout.readline():
-        about = json.loads(line)
-        if "error" in about:
-            raise ImageRefused.of(
-                "corrupt-pixel-data",
-                "the pixels of the image cannot be decoded",
-                value=about["error"],
-                next_step="export the image again, uncompressed if possible",
-                hazard="H09",
-            )
-        array = np.empty(about["shape"], about["dtype"])
-        if array.nbytes > memory_bytes or not _read_fully(process.stdout, array):
+
+
+def _receive(
+    process: subprocess.Popen[bytes], memory_bytes: int
+) -> tuple[dict[str, Any], NDArray] | None:
+    """The next result; None when the child has ended as it should."""
+    assert process.stdout is not None
+    line = process.stdout.readline(_MAX_LINE)
+    if not line:
+        if process.wait() != 0:
             raise _died()
-        yield about, array
-    if process.wait() != 0:
+        return None
+    try:
+        about = json.loads(line)
+        error = about.get("error")
+        shape, dtype = (0,) if error else about["shape"], np.dtype(about.get("dtype", "u1"))
+        size = math.prod(shape) * dtype.itemsize
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise _died() from None
+    if error:
+        raise ImageRefused.of(
+            "corrupt-pixel-data",
+            "the pixels of the image cannot be decoded",
+            value=str(error),
+            next_step="export the image again, uncompressed if possible",
+            hazard="H09",
+        )
+    if not 0 <= size <= memory_bytes or dtype.hasobject:
         raise _died()
+    array = np.empty(shape, dtype)
+    if not _read_fully(process.stdout, array):
+        raise _died()
+    return about, array
 
 
 def _read_fully(stream: IO[bytes], array: NDArray) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from hexafix.errors import Fault, ImageRefused, InputError
 from hexafix.imaging.decoding import decode_frames, require_decoder
 from hexafix.imaging.dicom_header import DEFLATED, EXPLICIT_BIG, PLAIN_SYNTAXES, SliceHeader
+from hexafix.imaging.encapsulated import faults_of_streams
 from hexafix.imaging.fingerprint import hash_slice
 from hexafix.imaging.hounsfield import NeedsFloat, convert, stored_type
 from hexafix.imaging.slice_stack import SliceStack, listed
@@ -49,11 +51,9 @@ def faults_of_length(slices: Sequence[SliceHeader]) -> list[Fault]:
     for item in slices:
         pixels = item.pixels
         where = "?" if item.position_mm is None else ", ".join(f"{v:.2f}" for v in item.position_mm)
-        if pixels.transfer_syntax == DEFLATED:
-            continue
         if pixels.offset is None:
             missing.append(f"({where})")
-        elif pixels.transfer_syntax in PLAIN_SYNTAXES:
+        elif pixels.transfer_syntax in PLAIN_SYNTAXES or pixels.transfer_syntax == DEFLATED:
             expected = frame_bytes(item) * item.frames
             stated = pixels.length or 0
             # An odd number of bytes is padded to an even one.
@@ -84,7 +84,7 @@ def faults_of_length(slices: Sequence[SliceHeader]) -> list[Fault]:
         )
     for syntax in sorted({item.pixels.transfer_syntax for item in slices}):
         faults += require_decoder(syntax)
-    return faults
+    return faults + faults_of_streams(slices)
 
 
 def read_pixels(stack: SliceStack, progress: Progress) -> Pixels:
@@ -153,7 +153,7 @@ def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) ->
     return Pixels(voxels, hashes, min(lowest))
 
 
-def read_slices(slices: Sequence[SliceHeader], out: Sequence[NDArray] | NDArray) -> Generator[None]:
+def read_slices(slices: Sequence[SliceHeader], out: Iterable[NDArray]) -> Generator[None]:
     """Write the Hounsfield units of each slice into its part of `out`, one a step.
 
     Close the iterator when it is left early.
@@ -161,7 +161,7 @@ def read_slices(slices: Sequence[SliceHeader], out: Sequence[NDArray] | NDArray)
     Parameters
     ----------
     slices : sequence of SliceHeader
-    out : sequence of ndarray, shape (J, I) each, int16 or float32
+    out : iterable of ndarray, shape (J, I) each, int16 or float32
 
     Raises
     ------
@@ -216,13 +216,21 @@ def faults_of_doubles(stack: SliceStack) -> list[Fault]:
     different = []
     pairs = [(stack.slices[index], double) for index, double in stack.doubled]
     flat = [item for pair in pairs for item in pair]
-    values = [np.empty((item.rows, item.columns), np.float32) for item in flat]
-    with closing(read_slices(flat, values)) as done:
-        for _ in done:
-            pass
-    for number, (index, _) in enumerate(stack.doubled):
-        kept, double = values[2 * number : 2 * number + 2]
-        if not _same_place(*pairs[number]) or not np.array_equal(kept, double):
+    # One pair in memory at a time: a file's compressed doubles are as many as it likes.
+    latest: deque[NDArray] = deque(maxlen=2)
+
+    def values() -> Iterator[NDArray]:
+        for item in flat:
+            latest.append(np.empty((item.rows, item.columns), np.float32))
+            yield latest[-1]
+
+    with closing(read_slices(flat, values())) as done:
+        for (index, _), pair in zip(stack.doubled, pairs, strict=True):
+            next(done)
+            next(done)
+            kept, double = latest
+            if _same_place(*pair) and np.array_equal(kept, double):
+                continue
             different.append(f"{stack.origins_mm[index] @ stack.axes[2]:.3f}")
     if not different:
         return []

@@ -63,7 +63,10 @@ def _limit_memory(memory_bytes: int) -> None:
         return
     try:
         resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
-    except (OSError, ValueError):  # a system that has a lower limit already, or none to set
+        # A crash of a decoder is a message, not a file as large as the child.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    except (OSError, ValueError, OverflowError):
+        # A system that has a lower limit already, or none to set.
         return
 
 
