@@ -109,6 +109,10 @@ class Refused(HexaFixError):
     exit_code = 3
 
 
+class SelfTestFailed(Refused):
+    """An installed library does not give the known answer; the message names it (H54)."""
+
+
 class ImageRefused(Refused, ValueError):
     """The image's geometry or content cannot be trusted."""
 

@@ -18,6 +18,7 @@ from hexafix.imaging.file_geometry import (
     faults_of_grid,
 )
 from hexafix.imaging.fingerprint import fingerprint
+from hexafix.imaging.golden_image_files import ItkProof
 from hexafix.imaging.isolation import run_isolated
 from hexafix.imaging.metaimage_header import read_metaimage_header
 from hexafix.imaging.nifti_header import read_nifti_header
@@ -100,9 +101,12 @@ def load_isolated(
     size = int(np.prod(geometry.size_ijk))
     memory = _BASE_MEMORY + 2 * size * _LARGEST_VOXEL
     seconds = _BASE_SECONDS + size / _VOXELS_PER_SECOND
-    results = run_isolated("itk", [str(path), reader], memory_bytes=memory, seconds=seconds)
-    with closing(results):
-        return next(results)
+    with ItkProof(reader) as proof:
+        arguments = [*proof.request, str(path), reader]
+        results = run_isolated("itk", arguments, memory_bytes=memory, seconds=seconds)
+        with closing(results):
+            proof.check(results)
+            return next(results)
 
 
 def _refuse_doubts(about: dict[str, Any]) -> None:

@@ -24,11 +24,11 @@ def decode(arguments: list[Any]) -> Iterator[Result]:
 
 
 def itk(arguments: list[Any]) -> Iterator[Result]:
-    """One image file, given as path and name of ITK's reader."""
+    """Image files, each given as path and name of ITK's reader, one after the other."""
     from hexafix.imaging.itk_reader import load_with_itk
 
-    path, reader = arguments
-    yield load_with_itk(Path(path), reader)
+    for path, reader in zip(arguments[::2], arguments[1::2], strict=True):
+        yield load_with_itk(Path(path), reader)
 
 
 def main() -> None:
