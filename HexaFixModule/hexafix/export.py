@@ -54,7 +54,7 @@ def write_export(files: Mapping[str, bytes], folder: Path) -> None:
             _clear_leftovers(folder)
             staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.staging-", dir=folder.parent))
             try:
-                staging.chmod(0o755)
+                staging.chmod(0o777 & ~_umask())
                 for name, content in {**files, MANIFEST: manifest(files)}.items():
                     _write_synced(staging / name, content)
                 _sync_folder(staging)
@@ -66,7 +66,7 @@ def write_export(files: Mapping[str, bytes], folder: Path) -> None:
         raise InputError.of(
             "export-not-written",
             f"the export could not be written: {error.strerror}",
-            where=str(folder),
+            where="--out",
             hazard="H46",
             next_step="free disk space or choose another --out; older results are unchanged",
         ) from error
@@ -87,16 +87,16 @@ def check_target(folder: Path) -> None:
         raise InputError.of(
             "target-not-an-export",
             "the target exists and is not an export of HexaFix; nothing there was touched",
-            where=str(folder),
+            where="--out",
             next_step="choose another --out",
         )
-    foreign = sorted(held - {*FILES, MANIFEST})
+    foreign = held - {*FILES, MANIFEST}
     if foreign:
         raise InputError.of(
             "target-holds-other-files",
             "the target holds files that are not part of an export and would be lost",
-            value=", ".join(foreign[:5]),
-            where=str(folder),
+            value=f"{len(foreign)} files",
+            where="--out",
             next_step="move them away or choose another --out",
         )
 
@@ -153,14 +153,14 @@ def _take_lock(descriptor: int, lock: Path) -> None:
                 "another-writer",
                 "another HexaFix is writing this export",
                 value=owner or "starting now",
-                where=str(lock),
+                where="--out",
                 hazard="H47",
                 next_step="wait until it is done",
             )
         raise InputError.of(
             "another-writer",
             "another HexaFix has just written this export",
-            where=str(lock),
+            where="--out",
             hazard="H47",
             next_step="try again",
         )
@@ -171,6 +171,13 @@ def _user() -> str:
         return getpass.getuser()
     except (KeyError, OSError):
         return "unknown user"
+
+
+def _umask() -> int:
+    """The user's own choice of who may read new files."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
 
 
 def _clear_leftovers(folder: Path) -> None:

@@ -19,7 +19,8 @@ def read_json_object(path: Path, *, what: str) -> tuple[bytes, dict[str, Any]]:
     ----------
     path : Path
     what : str
-        What the file is, for messages, e.g. ``case file``.
+        What the file is, for messages, e.g. ``case file``; its own name may hold a patient's and
+        is never shown (H51).
 
     Raises
     ------
@@ -34,17 +35,17 @@ def read_json_object(path: Path, *, what: str) -> tuple[bytes, dict[str, Any]]:
                 f"the {what} is too large",
                 value=f"{path.stat().st_size} bytes",
                 limit=f"{MAX_BYTES} bytes",
-                where=path.name,
+                where=what,
             )
         raw = path.read_bytes()
     except OSError as error:
         raise InputError.of(
             "file-unreadable",
             f"the {what} cannot be read: {error.strerror}",
-            where=str(path),
+            where=what,
             next_step="check the path",
         ) from error
-    return raw, parse_json_object(raw, what=what, where=path.name)
+    return raw, parse_json_object(raw, what=what, where=what)
 
 
 def parse_json_object(raw: bytes, *, what: str, where: str) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -69,7 +70,6 @@ def case_from_document(
             Fault(
                 "image-missing",
                 "there is no image at this path",
-                value=str(content["image"]["path"]),
                 where="image.path",
                 next_step="give the DICOM folder or image file relative to the case file",
             )
@@ -124,11 +124,11 @@ def _schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], se
         faults = []
         for row in rows:
             unknown = row["type"] == "extra_forbidden"
-            value = None if row["type"] == "missing" or unknown else repr(row["input"])[:60]
+            value = None if row["type"] == "missing" or unknown else _shown(row)
             faults.append(
                 Fault(
                     "unknown-key" if unknown else "case-value",
-                    "this key is not known" if unknown else row["msg"],
+                    "this key is not known" if unknown else _said(row),
                     value=value,
                     where=_json_path(row["loc"]),
                     hazard="H55",
@@ -137,6 +137,24 @@ def _schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], se
             )
         return faults, {str(row["loc"][0]) for row in rows if row["loc"]}
     return [], set()
+
+
+def _said(row: Any) -> str:
+    """Pydantic's words, except where they quote the input."""
+    if row["type"] == "union_tag_invalid":
+        return f"kind must be one of {row['ctx']['expected_tags']}"
+    return row["msg"]
+
+
+def _shown(row: Any) -> str:
+    """A wrong value that can name nobody: a number or a date's digits, else its size (H51)."""
+    given = row["input"]
+    if given is None or isinstance(given, bool | int | float):
+        return repr(given)[:60]
+    if row["type"].startswith("date_") and re.fullmatch(r"[0-9./-]{1,12}", str(given)):
+        return str(given)
+    kind = {str: "a text", list: "a list", dict: "an object"}.get(type(given), "a value")
+    return f"{kind} of length {len(given)}" if isinstance(given, str | list | dict) else kind
 
 
 def _json_path(location: tuple[int | str, ...]) -> str:
@@ -168,7 +186,6 @@ def _resolve_fixator(
                 raise InputError.of(
                     "fixator-unknown",
                     "neither a shipped fixator nor a file",
-                    value=given,
                     limit="one of " + ", ".join(shipped_fixators()) + ", or a path",
                     hazard="H23",
                 )

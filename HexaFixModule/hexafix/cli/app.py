@@ -8,10 +8,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import App, CycloptsError, Parameter
 
 from hexafix import __version__
-from hexafix.cli.console import print_json, progress_bar, report_error
+from hexafix.cli.console import (
+    command_line_error,
+    print_json,
+    progress_bar,
+    quiet_libraries,
+    report_error,
+)
 from hexafix.errors import HexaFixError
 
 NOTICE = "Research software, not a medical device."
@@ -33,10 +39,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     # All matrices here are small: one thread is faster and makes results repeatable (H57).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        result = app(tokens, result_action="return_value")
+        with quiet_libraries():
+            result = app(
+                tokens, result_action="return_value", exit_on_error=False, print_error=False
+            )
         code = result if isinstance(result, int) else 0
     except HexaFixError as error:
         code = report_error(error, as_json="--json" in tokens)
+    except CycloptsError as error:
+        code = report_error(command_line_error(error), as_json="--json" in tokens)
     except KeyboardInterrupt:
         print("hexafix: stopped; nothing was written", file=sys.stderr)
         code = 130
@@ -48,7 +59,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def _defect(error: Exception) -> int:
-    """Tell a defect without its values: they could hold patient data."""
+    """Tell a defect without its values: they could hold patient data.
+
+    The traceback that HEXAFIX_DEBUG asks for may hold paths and header values: the user's choice.
+    """
     import traceback
 
     if os.environ.get("HEXAFIX_DEBUG"):
@@ -57,7 +71,7 @@ def _defect(error: Exception) -> int:
     place = f"{Path(frame.filename).name}:{frame.lineno}"
     print(
         f"hexafix: a defect of HexaFix: {type(error).__name__} at {place}. Nothing was written. "
-        "Set HEXAFIX_DEBUG=1 for the traceback.",
+        "Set HEXAFIX_DEBUG=1 for the traceback; it may hold patient data.",
         file=sys.stderr,
     )
     return 1
@@ -217,6 +231,7 @@ def plan(
     with SceneRenderer() as renderer, progress_bar(quiet=quiet) as progress:
         from hexafix.case import load_case
         from hexafix.cli.show import plan_text
+        from hexafix.export import FILES, MANIFEST
         from hexafix.pipeline import plan_and_export
 
         document = plan_and_export(
@@ -226,7 +241,7 @@ def plan(
             renderer=renderer,
             progress=progress,
         )
-    print_json(document) if json else print(plan_text(document, out))
+    print_json(document) if json else print(plan_text(document, (*FILES, MANIFEST)))
     return 0
 
 

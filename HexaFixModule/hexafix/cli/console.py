@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import json
+import logging
+import os
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from hexafix.errors import HexaFixError, Refused
+from cyclopts import (
+    CoercionError,
+    CycloptsError,
+    MissingArgumentError,
+    UnknownCommandError,
+    UnusedCliTokensError,
+)
+
+from hexafix.errors import HexaFixError, InputError, Refused
 from hexafix.progress import Progress, silent
 
 
@@ -47,6 +58,34 @@ def print_json(document: Any) -> None:
     """One JSON document on stdout and nothing else."""
     json.dump(document, sys.stdout, indent=2, allow_nan=False, ensure_ascii=False)
     sys.stdout.write("\n")
+
+
+@contextmanager
+def quiet_libraries() -> Iterator[None]:
+    """Let no library warn or log past us: such texts quote header values and paths (H51)."""
+    logging.getLogger().addHandler(logging.NullHandler())
+    with warnings.catch_warnings():
+        if not (os.environ.get("HEXAFIX_DEBUG") or sys.warnoptions):
+            warnings.simplefilter("ignore")
+        yield
+
+
+def command_line_error(error: CycloptsError) -> InputError:
+    """A wrong command line, told without quoting it: what was typed may be a private path."""
+    command = " ".join(["hexafix", *(error.command_chain or ())])
+    step = f"see {command} --help"
+    match error:
+        case MissingArgumentError():
+            what = str(error).rstrip(".")
+        case UnknownCommandError():
+            what, step = "there is no such command", "see hexafix --help"
+        case CoercionError(argument=argument) if argument is not None:
+            what = f"{argument.name} does not take this value"
+        case UnusedCliTokensError():
+            what = f"{command} takes fewer arguments; a path with spaces needs quotes"
+        case _:
+            what = f"{command} does not take these options"
+    return InputError.of("command-line", what, next_step=step)
 
 
 def report_error(error: HexaFixError, *, as_json: bool) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -92,8 +92,8 @@ def layout_text(document: dict[str, Any]) -> str:
     return "\n".join([*lines, *(f"advice: {text}" for text in document["advice"])])
 
 
-def plan_text(document: dict[str, Any], folder: Path) -> str:
-    """The plan in a few lines, and where it lies."""
+def plan_text(document: dict[str, Any], names: Sequence[str]) -> str:
+    """The plan in a few lines, and the files of the export; their folder's name may be private."""
     schedule, mechanism = document["schedule"], document["mechanism"]
     difference = mechanism["difference"]
     last = schedule["rows"][-1]
@@ -109,7 +109,7 @@ def plan_text(document: dict[str, Any], folder: Path) -> str:
         *_gates(document["gates"]),
         *_warnings(document["image"]["warnings"]),
         f"approval: {document['approval']}. Research software, not a medical device.",
-        f"export in {folder}",
+        f"the export is complete: {', '.join(names)}",
     ]
     return "\n".join(lines)
 

@@ -176,8 +176,8 @@ def require_path(path: Path) -> Path:
         raise InputError.of(
             "image-not-found",
             "the image file or folder does not exist",
-            where=path.name,
-            next_step="check image.path, relative to the case file",
+            where="image",
+            next_step="check the path; image.path is relative to the case file",
         )
     return path
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pydicom.uid import UID
+
 OTHER = "other"
 """Stands for every word that is not known."""
 
@@ -26,6 +28,11 @@ _IMAGE_TYPES = frozenset(
         *("CONSTANT_ANGLE", "STATIONARY", "HELIX", "SPIRAL", "SEQUENCE", "SCREEN_SAVE", "NONE"),
     )
 )
+
+
+def shown_transfer_syntax(uid: str) -> str:
+    """A transfer syntax that the standard knows; of any other only that it is private."""
+    return uid if UID(uid).is_transfer_syntax and not UID(uid).is_private else "a private one"
 
 
 def shown_modality(modality: str) -> str:

@@ -115,7 +115,7 @@ def _fields(path: Path) -> dict[str, str]:
             break
         name = name.strip().lower()
         if name in fields:
-            raise _broken(f"field '{name}' given twice")
+            raise _broken("a field given twice")
         fields[name] = value.strip()
         if name == "elementdatafile":
             return fields

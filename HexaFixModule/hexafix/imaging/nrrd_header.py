@@ -56,7 +56,7 @@ def read_nrrd_header(path: Path) -> FileGeometry:
             refuse_geometry(
                 "the space is not named as one of the patient's (LPS, RAS, LAS)",
                 where,
-                value=fields.get("space", "none"),
+                value="another one" if "space" in fields else "none",
             )
         )
     axes, origin = _directions(fields, where)
@@ -114,7 +114,7 @@ def _fields(path: Path) -> dict[str, str]:
             continue
         name = name.strip().lower()
         if name in fields:
-            raise _broken(f"field '{name}' given twice")
+            raise _broken("a field given twice")
         fields[name] = value.strip()
     data = fields.get("data file", fields.get("datafile", ""))
     if data.upper().startswith("LIST"):

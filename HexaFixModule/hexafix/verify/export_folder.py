@@ -63,7 +63,7 @@ def _read_files(folder: Path) -> dict[str, bytes]:
             "export-incomplete",
             "files of the export are missing",
             value=", ".join(missing),
-            where=str(folder),
+            where="the export",
             hazard="H46",
             next_step="plan the case again",
         )
