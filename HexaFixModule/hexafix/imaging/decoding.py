@@ -16,6 +16,7 @@ from pydicom.uid import UID
 
 from hexafix.errors import Fault, MissingLibrary
 from hexafix.imaging.dicom_header import DEFLATED, PLAIN_SYNTAXES, SliceHeader
+from hexafix.imaging.golden_streams import DecoderProof
 from hexafix.imaging.header_words import shown_transfer_syntax
 from hexafix.imaging.isolation import run_isolated
 
@@ -68,24 +69,31 @@ def require_decoder(transfer_syntax: str) -> list[Fault]:
 def decode_frames(slices: Sequence[SliceHeader]) -> Generator[NDArray]:
     """Stored pixel values of compressed slices, shape (J, I) each, decoded in a child process.
 
+    The child decodes pixels that are known before it decodes these (H54).
+
     Close the iterator when it is left early.
 
     Raises
     ------
     ImageRefused
         If a decoder fails or the child dies.
+    SelfTestFailed
+        If a decoder does not give the known pixels.
     """
     if not slices:
         return
     largest = max(item.rows * item.columns for item in slices)
     inflated = max(3 * (item.pixels.length or 0) for item in slices)
+    asked = [(str(item.path.resolve()), item.frame, item.pixels.transfer_syntax) for item in slices]
+    proof = DecoderProof(syntax for _, _, syntax in asked)
     results = run_isolated(
         "decode",
-        [(str(item.path.resolve()), item.frame, item.pixels.transfer_syntax) for item in slices],
+        [*proof.requests, *asked],
         memory_bytes=_BASE_MEMORY + largest * _BYTES_PER_PIXEL + inflated,
         seconds=_BASE_SECONDS + largest / _PIXELS_PER_SECOND,
     )
-    with closing(results):
+    with proof, closing(results):
+        proof.check(results)
         for _, stored in results:
             yield stored
 
