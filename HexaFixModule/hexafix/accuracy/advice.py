@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from hexafix.accuracy.jacobian import isotropic_covariances, volume_error
 from hexafix.accuracy.layout_check import (
     PREFERRED_DEG,
+    UNIQUENESS_TARGET_MM,
     LayoutCheck,
     LayoutVerdict,
     angle_rule,
@@ -27,9 +28,6 @@ from hexafix.hardware import MarkerLayout, MarkerSite
 from hexafix.recognition.choices import UNIQUENESS_LIMIT_MM
 from hexafix.recognition.least_squares import IMAGE_SIGMA_MM, INSTALLATION_SIGMA_MM
 from hexafix.recognition.rigid import rigid_rms_mm
-
-UNIQUENESS_TARGET_MM = 8.0
-"""Uniqueness that advised layouts reach: the limit of 5 mm and room for building them."""
 
 STEP_DEG, PAIR_STEP_DEG = 5, 15
 """Steps of the angles when one marker or two are moved."""

@@ -23,6 +23,9 @@ PREFERRED_DEG = 45.0
 RELAXED_MIN_DEG, RELAXED_SPREAD_DEG = 15.0, 150.0
 """Smallest minimum, largest maximum minus median included angle (Section 4.3.2)."""
 
+UNIQUENESS_TARGET_MM = 8.0
+"""Uniqueness that advised layouts reach: the limit of 5 mm and room for building them."""
+
 ANGLE_TOLERANCE_DEG = 1e-6
 """Rounding of angles given in degrees."""
 
@@ -204,11 +207,11 @@ def angle_rule(layout: MarkerLayout) -> str:
     would break the rule that three even ones meet.
     """
     phi = np.array([site.sweep_rad for site in layout.sites])
-    rules = set(np.unique(_triple_rules(phi[list(map(list, combinations(range(len(phi)), 3)))])))
+    rules = set(np.unique(triple_rules(phi[list(map(list, combinations(range(len(phi)), 3)))])))
     return next(name for name in ("preferred", "relaxed", "violated") if name in rules)
 
 
-def _triple_rules(sweep_rad: Array) -> NDArray[np.str_]:
+def triple_rules(sweep_rad: Array) -> NDArray[np.str_]:
     """Rule of each triple of sweep angles, shape (K, 3) to (K,)."""
     phi = np.sort(np.mod(np.degrees(sweep_rad), 360.0), axis=-1)
     gaps = np.sort(np.diff(np.concatenate([phi, phi[:, :1] + 360.0], axis=-1), axis=-1), axis=-1)

@@ -7,15 +7,20 @@ from hexafix.hardware.definition import (
     shipped_fixators,
 )
 from hexafix.hardware.fixator import Fixator, Ring, StrutType
+from hexafix.hardware.holes import HoleCircle, Places, SiteList, places_from_document
 from hexafix.hardware.layout import MarkerLayout, MarkerSite
 
 __all__ = [
     "Fixator",
+    "HoleCircle",
     "MarkerLayout",
     "MarkerSite",
+    "Places",
     "Ring",
+    "SiteList",
     "StrutType",
     "fixator_from_document",
+    "places_from_document",
     "read_fixator",
     "shipped_fixator",
     "shipped_fixators",
