@@ -15,10 +15,7 @@ pytestmark = pytest.mark.usefixtures("itk_in_process")
 
 REFUSED = {
     "dcm_qa_ct/GE_tilt_varspacing": {"uneven-spacing", "gantry-tilt"},
-    "dcm_qa_ct/Philips_tilt_m18.5": {"gantry-tilt"},
-    "dcm_qa_ct/Philips_tilt_p16.5": {"gantry-tilt"},
     "dcm_qa_ct/Philips_mixed_extra": {"no-usable-series", "no-geometry"},
-    "dicom2nifti_failing/gantrytilting/001": {"gantry-tilt"},
     "dicom2nifti_failing/sliceincrement/001": {"missing-slice"},
     "dicom2nifti_failing/sliceincrement/002": {"missing-slice", "gantry-tilt"},
     "dicom2nifti_failing/sliceorientation/001": {
@@ -119,9 +116,11 @@ def test_an_oblique_nifti_is_read(ct_corpus):
 @pytest.mark.parametrize(
     ("name", "tilt"),
     [
-        ("dcm_qa_ct/Philips_tilt_m18.5", 18.5),
+        ("dcm_qa_ct/Philips_tilt_m18.5", -18.5),
+        ("dcm_qa_ct/GE_tilt_varspacing", -18.5),
         ("dcm_qa_ct/Philips_tilt_p16.5", 16.5),
-        ("dicom2nifti_failing/gantrytilting/001", 14.0),
+        ("dicom2nifti_failing/gantrytilting/001", -14.0),
+        ("dicom2nifti_failing/sliceincrement/002", -15.5),
     ],
 )
 def test_the_tilt_is_found_from_positions_whatever_the_tag_says(name, tilt, ct_corpus):

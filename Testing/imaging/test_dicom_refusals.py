@@ -50,13 +50,17 @@ def test_spacing_that_drifts_is_refused_though_each_gap_is_within_tolerance(tmp_
     assert "drift" in fault.what
 
 
-def test_gantry_tilt_is_refused_by_geometry_not_by_the_tag(tmp_path, writer):
-    for degrees in (0.06, -16.5):
-        angle = np.radians(degrees)
-        grid = writer.grid(step=5.0, step_direction=(0.0, np.sin(angle), np.cos(angle)))
-        folder = writer.save(tmp_path / str(degrees), writer.slices(grid))
-        fault = only(faults_of(folder), "gantry-tilt", "H02")
-        assert fault.value == f"{abs(degrees):.2f} deg"
+@pytest.mark.parametrize(("degrees", "refused"), [(34.9, False), (35.1, True), (-40.0, True)])
+def test_a_lean_beyond_any_gantry_is_refused(degrees, refused, tmp_path, writer):
+    angle = np.radians(degrees)
+    grid = writer.grid(step=2.0, step_direction=(0.0, np.sin(angle), np.cos(angle)))
+    folder = writer.save(tmp_path, writer.slices(grid))
+    if not refused:
+        assert read_volume(folder).source.acquisition is not None
+        return
+    fault = only(faults_of(folder), "gantry-tilt", "H02")
+    assert fault.value == f"{degrees:+.2f} deg about the row direction"
+    assert fault.limit == "35 deg"
 
 
 def test_tilt_and_a_lost_slice_are_both_named(tmp_path, writer):

@@ -40,11 +40,13 @@ class SeriesSummary:
     size_ij : tuple of int
         Columns and rows.
     spacing_mm : tuple of float or None
-        Between columns, between rows, between slices; None where the header lacks it.
+        Between columns, between rows, between slices along their normal; None where the header
+        lacks it.
     orientation : str
         ``axial``, ``coronal``, ``sagittal``, ``oblique`` or ``unknown``.
     tilt_deg : float or None
-        Angle between the slice normal and the line of slice origins; None where there is no line.
+        Angle between the slice normal and the line of slice origins, signed as at
+        `hexafix.imaging.gantry_tilt.GantryTilt`; None where there is no line.
     excluded : str or None
         Why the series can never be the volume (localizer, secondary capture, ...).
     faults : tuple of Fault
@@ -73,8 +75,8 @@ class SeriesSummary:
             f"{self.modality or 'no modality'}, {self.slices} slices of "
             f"{self.size_ij[0]} x {self.size_ij[1]}, {spacing}, {self.orientation}"
         )
-        if self.tilt_deg is not None and self.tilt_deg > TILT_TOLERANCE_DEG:
-            text += f", tilted by {self.tilt_deg:.2f} deg"
+        if self.tilt_deg is not None and abs(self.tilt_deg) > TILT_TOLERANCE_DEG:
+            text += f", tilted by {self.tilt_deg:+.2f} deg"
         return text + (f", left out: {self.excluded}" if self.excluded else "")
 
 
@@ -200,7 +202,7 @@ def _summary(excluded: str | None, items: list[SliceHeader]) -> SeriesSummary:
         faults += _faults_of_pixels(items)
     spacing, orientation, tilt = None, "unknown", None
     if stack is not None:
-        i, j, k = np.linalg.norm(stack.ijk_to_lps[:3, :3], axis=0)
+        i, j, k = np.diag(stack.axes @ stack.ijk_to_lps[:3, :3])
         spacing = (float(i), float(j), float(k))
         normal = np.abs(stack.axes[2])
         names = ("sagittal", "coronal", "axial")

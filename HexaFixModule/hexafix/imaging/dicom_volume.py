@@ -18,6 +18,7 @@ from hexafix.imaging.dicom_series import (
     scan,
 )
 from hexafix.imaging.fingerprint import combine
+from hexafix.imaging.gantry_tilt import TILT_TOLERANCE_DEG
 from hexafix.imaging.header_words import shown_modality
 from hexafix.imaging.hounsfield import faults_of_values
 from hexafix.imaging.pixel_data import (
@@ -27,7 +28,7 @@ from hexafix.imaging.pixel_data import (
     read_pixels,
 )
 from hexafix.imaging.slice_stack import SliceStack, arrange
-from hexafix.imaging.volume import ImageSource, Volume
+from hexafix.imaging.volume import Acquisition, ImageSource, Volume
 from hexafix.progress import Progress
 
 THICK_SLICES_MM = 2.0
@@ -49,16 +50,23 @@ def read_dicom(path: Path, series_instance_uid: str | None, progress: Progress) 
     if stack is None or faults:
         raise ImageRefused(*faults)
     pixels = read_pixels(stack, progress)
+    grid = stack.orthogonal_grid()
     source = ImageSource(
         kind="dicom",
-        sha256=combine(pixels.slice_hashes, pixels.voxels, stack.ijk_to_lps),
+        sha256=combine(
+            pixels.slice_hashes,
+            size_ijk=stack.size_ijk,
+            dtype=pixels.voxels.dtype,
+            ijk_to_lps=stack.ijk_to_lps,
+        ),
         slice_thickness_mm=_most_common(item.thickness_mm for item in slices),
         laterality=_most_common(item.laterality for item in slices),
         body_part=_most_common(item.body_part for item in slices),
         patient_position=_most_common(item.patient_position for item in slices),
         warnings=tuple(_warnings(folder, slices, stack, pixels)),
+        acquisition=grid and Acquisition(stack.ijk_to_lps, stack.size_ijk, stack.tilt_deg),
     )
-    return Volume(pixels.voxels, stack.ijk_to_lps, source)
+    return Volume(pixels.voxels, (grid or stack).ijk_to_lps, source)
 
 
 def _most_common(values: Iterable[_Value | None]) -> _Value | None:
@@ -91,6 +99,11 @@ def _warnings(
     folder: DicomFolder, slices: Sequence[SliceHeader], stack: SliceStack, pixels: Pixels
 ) -> Iterable[str]:
     """What the user should know about the series that was read."""
+    if abs(stack.tilt_deg) > TILT_TOLERANCE_DEG:
+        yield (
+            f"gantry tilt (H02): the slices were acquired with a tilt of {stack.tilt.words}; they "
+            "were resampled from per-slice geometry, each moved within its own plane"
+        )
     spacing = float(stack.gaps_mm.mean())
     if max(spacing, *(item.thickness_mm or 0.0 for item in slices)) > THICK_SLICES_MM:
         yield f"thick slices (spacing {spacing:.2f} mm): ball centres are less accurate"

@@ -23,21 +23,30 @@ def hash_slice(values: NDArray) -> bytes:
     return hashlib.sha256(np.ascontiguousarray(values, order).data).digest()
 
 
-def combine(slice_hashes: Sequence[bytes], voxels: NDArray, ijk_to_lps: NDArray) -> str:
-    """The image's hash from its slices' hashes, its type, shape and geometry.
+def combine(
+    slice_hashes: Sequence[bytes],
+    *,
+    size_ijk: tuple[int, int, int],
+    dtype: np.dtype,
+    ijk_to_lps: NDArray,
+) -> str:
+    """The image's hash from its slices' hashes, its type, size and geometry.
 
     Parameters
     ----------
     slice_hashes : sequence of bytes
         `hash_slice` of each slice in order.
-    voxels : ndarray, shape (K, J, I)
+    size_ijk : tuple of int
+    dtype : dtype
     ijk_to_lps : ndarray, shape (4, 4)
+        Of a tilted stack the acquired, sheared one: its slices are hashed as they were acquired,
+        so that the hash does not depend on how they are moved.
     """
-    k, j, i = voxels.shape
+    i, j, k = size_ijk
     ends = np.array([(0, 0, 0), (i - 1, 0, 0), (0, j - 1, 0), (0, 0, k - 1)], float)
     corners = ends @ ijk_to_lps[:3, :3].T + ijk_to_lps[:3, 3]
     geometry = np.floor(corners / _GRID_MM + _OFFSET).astype("<i8")
-    total = hashlib.sha256(f"hexafix-volume-1 {voxels.dtype.name} {k} {j} {i}".encode())
+    total = hashlib.sha256(f"hexafix-volume-1 {dtype.name} {k} {j} {i}".encode())
     total.update(geometry.tobytes())
     for digest in slice_hashes:
         total.update(digest)
@@ -47,4 +56,6 @@ def combine(slice_hashes: Sequence[bytes], voxels: NDArray, ijk_to_lps: NDArray)
 def fingerprint(voxels: NDArray, ijk_to_lps: NDArray) -> str:
     """The hash of a whole volume in memory; parameters as in `combine`."""
     with ThreadPoolExecutor(thread_count()) as pool:
-        return combine(list(pool.map(hash_slice, voxels)), voxels, ijk_to_lps)
+        hashes = list(pool.map(hash_slice, voxels))
+    k, j, i = voxels.shape
+    return combine(hashes, size_ijk=(i, j, k), dtype=voxels.dtype, ijk_to_lps=ijk_to_lps)

@@ -17,8 +17,10 @@ from hexafix.imaging.decoding import decode_frames, require_decoder
 from hexafix.imaging.dicom_header import DEFLATED, EXPLICIT_BIG, PLAIN_SYNTAXES, SliceHeader
 from hexafix.imaging.encapsulated import faults_of_streams
 from hexafix.imaging.fingerprint import hash_slice
-from hexafix.imaging.hounsfield import NeedsFloat, convert, stored_type
-from hexafix.imaging.slice_stack import SliceStack, listed
+from hexafix.imaging.gantry_tilt import OrthogonalGrid
+from hexafix.imaging.hounsfield import AIR_HU, NeedsFloat, convert, stored_type
+from hexafix.imaging.slice_agreement import listed
+from hexafix.imaging.slice_stack import SliceStack
 from hexafix.progress import Progress
 from hexafix.threads import thread_count
 
@@ -31,7 +33,17 @@ _POLL_SECONDS = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """Voxels in HU, shape (K, J, I), int16 or float32; each slice's hash; the lowest value."""
+    """The pixels of a stack.
+
+    Attributes
+    ----------
+    voxels : ndarray, shape (K, J, I), int16 or float32
+        HU, on the orthogonal grid where the stack is tilted.
+    slice_hashes : list of bytes
+        Of each slice as it was acquired.
+    lowest_hu : float
+        The lowest acquired value.
+    """
 
     voxels: NDArray
     slice_hashes: list[bytes]
@@ -103,8 +115,8 @@ def read_pixels(stack: SliceStack, progress: Progress) -> Pixels:
     InputError
         If the volume is larger than any CT.
     """
-    first = stack.slices[0]
-    shape = (len(stack.slices), first.rows, first.columns)
+    grid = stack.orthogonal_grid()
+    shape = (grid or stack).size_ijk[::-1]
     if np.prod(shape, dtype=float) > MAX_VOXELS:
         raise InputError.of(
             "volume-too-large",
@@ -114,12 +126,14 @@ def read_pixels(stack: SliceStack, progress: Progress) -> Pixels:
             next_step="crop or reconstruct the CT around the fixator",
         )
     try:
-        return _fill(stack.slices, np.empty(shape, np.int16), progress)
+        return _fill(stack.slices, np.empty(shape, np.int16), grid, progress)
     except NeedsFloat:
-        return _fill(stack.slices, np.empty(shape, np.float32), progress)
+        return _fill(stack.slices, np.empty(shape, np.float32), grid, progress)
 
 
-def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) -> Pixels:
+def _fill(
+    slices: Sequence[SliceHeader], voxels: NDArray, grid: OrthogonalGrid | None, progress: Progress
+) -> Pixels:
     hashes: list[bytes] = [b""] * len(slices)
     lowest = [0.0] * len(slices)
     stop = Event()
@@ -130,13 +144,20 @@ def _fill(slices: Sequence[SliceHeader], voxels: NDArray, progress: Progress) ->
 
     def fill(start: int) -> None:
         end = min(start + batch, len(slices))
-        with closing(read_slices(slices[start:end], voxels[start:end])) as done:
-            for k in range(start, end):
+        if grid is None:
+            acquired = list(voxels[start:end])
+        else:
+            # One slice in memory, used again for each: the moved one is all that is kept.
+            acquired = [np.empty((slices[0].rows, slices[0].columns), voxels.dtype)] * (end - start)
+        with closing(read_slices(slices[start:end], acquired)) as done:
+            for k, values in zip(range(start, end), acquired, strict=True):
                 if stop.is_set():
                     return
                 next(done)
-                lowest[k] = float(voxels[k].min())
-                hashes[k] = hash_slice(voxels[k])
+                lowest[k] = float(values.min())
+                if grid is not None:
+                    grid.place(values, k, voxels[k], outside=AIR_HU)
+                hashes[k] = hash_slice(values)
 
     with ThreadPoolExecutor(threads) as pool:
         futures = [pool.submit(fill, start) for start in range(0, len(slices), batch)]

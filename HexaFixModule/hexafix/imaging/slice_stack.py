@@ -7,7 +7,7 @@ is known to lie.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,21 @@ from numpy.typing import NDArray
 
 from hexafix.errors import Fault
 from hexafix.imaging.dicom_header import SliceHeader
+from hexafix.imaging.gantry_tilt import (
+    MAX_TILT_DEG,
+    TILT_TOLERANCE_DEG,
+    GantryTilt,
+    OrthogonalGrid,
+)
+from hexafix.imaging.slice_agreement import (
+    ORIENTATION_TOLERANCE,
+    differs,
+    faults_of_missing_geometry,
+    faults_of_mixture,
+    listed,
+)
 
 GAP_TOLERANCE_MM = 0.01
-ORIENTATION_TOLERANCE = 1e-4
-SPACING_TOLERANCE_MM = 1e-6
-TILT_TOLERANCE_DEG = 0.05
 # Headers with four decimals stay within this of unit length and of a right angle.
 AXES_TOLERANCE = 2e-4
 # What the tolerances above may add up to at a slice corner.
@@ -28,8 +38,6 @@ CORNER_TOLERANCE_MM = 0.05
 MIN_SLICES = 3
 # The frames of one file are counted in its header: none can be lost unseen.
 MIN_FRAMES = 2
-
-_LISTED = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +70,26 @@ class SliceStack:
         return np.diff(self.origins_mm @ self.axes[2])
 
     @property
+    def tilt(self) -> GantryTilt:
+        """How the line of slice origins leans against the slice normal."""
+        return GantryTilt.of(self.origins_mm[-1] - self.origins_mm[0], self.axes)
+
+    @property
     def tilt_deg(self) -> float:
-        """Angle between the slice normal and the line of slice origins."""
-        step = self.origins_mm[-1] - self.origins_mm[0]
-        across = np.linalg.norm(step - (step @ self.axes[2]) * self.axes[2])
-        return float(np.degrees(np.arctan2(across, step @ self.axes[2])))
+        """Signed angle of the tilt; its convention stands at `GantryTilt`."""
+        return self.tilt.deg
+
+    @property
+    def size_ijk(self) -> tuple[int, int, int]:
+        """Columns, rows and slices as acquired."""
+        return self.slices[0].columns, self.slices[0].rows, len(self.slices)
+
+    def orthogonal_grid(self) -> OrthogonalGrid | None:
+        """The grid to which tilted slices are moved; None when they are not tilted."""
+        if abs(self.tilt_deg) <= TILT_TOLERANCE_DEG:
+            return None
+        pitch = np.linalg.norm(self.ijk_to_lps[:3, :2], axis=0)
+        return OrthogonalGrid.around(self.origins_mm, self.axes, pitch, self.size_ijk[:2])
 
 
 def arrange(slices: Sequence[SliceHeader]) -> tuple[SliceStack | None, list[Fault]]:
@@ -86,19 +109,19 @@ def arrange(slices: Sequence[SliceHeader]) -> tuple[SliceStack | None, list[Faul
         whoever can compare the pixels.
     """
     placed = [item for item in slices if _has_geometry(item)]
-    faults = _missing_geometry(len(slices) - len(placed), len(slices))
+    faults = faults_of_missing_geometry(len(slices) - len(placed), len(slices))
     if not placed:
         return None, faults
-    faults += _mixed(placed)
+    faults += faults_of_mixture(placed)
     axes, bad_axes = _axes(placed)
     faults += bad_axes
     stack = _stack(placed, axes)
     faults += _too_few(stack)
     if len(stack.slices) > 1 and not any(fault.code == "mixed-orientation" for fault in faults):
-        grid = _uneven(stack) + _tilted(stack) + _shifted(stack)
-        faults += grid
+        faults += _uneven(stack) + _shifted(stack)
         if not faults:
             faults += _corners(stack)
+        faults += _tilted(stack, alone=not faults)
     return stack, faults
 
 
@@ -112,92 +135,13 @@ def _has_geometry(item: SliceHeader) -> bool:
     )
 
 
-def _missing_geometry(missing: int, total: int) -> list[Fault]:
-    if not missing:
-        return []
-    return [
-        Fault(
-            "no-geometry",
-            "slices without ImagePositionPatient, ImageOrientationPatient or PixelSpacing",
-            value=f"{missing} of {total} slices",
-            limit="0",
-            next_step="export the original CT series with its geometry",
-            hazard="H07",
-        )
-    ]
-
-
-def _mixed(slices: Sequence[SliceHeader]) -> list[Fault]:
-    """Attributes in which the slices of one series must agree."""
-    first = slices[0]
-    agreements: list[tuple[str, str, str, str, Callable[[SliceHeader], bool]]] = [
-        (
-            "mixed-frame-of-reference",
-            "slices in different frames of reference",
-            "H05",
-            "one FrameOfReferenceUID",
-            lambda s: s.frame_of_reference == first.frame_of_reference,
-        ),
-        (
-            "mixed-image-type",
-            "slices of different ImageType",
-            "H05",
-            "one ImageType",
-            lambda s: s.image_type[:3] == first.image_type[:3],
-        ),
-        (
-            "mixed-size",
-            "slices with different numbers of rows or columns",
-            "H06",
-            f"{first.columns} x {first.rows}",
-            lambda s: (s.rows, s.columns) == (first.rows, first.columns),
-        ),
-        (
-            "mixed-orientation",
-            "slices with different ImageOrientationPatient",
-            "H06",
-            f"{ORIENTATION_TOLERANCE:g}",
-            lambda s: _differs(s.orientation, first.orientation) <= ORIENTATION_TOLERANCE,
-        ),
-        (
-            "mixed-spacing",
-            "slices with different PixelSpacing",
-            "H06",
-            f"{SPACING_TOLERANCE_MM:g} mm",
-            lambda s: _differs(s.pixel_spacing_mm, first.pixel_spacing_mm) <= SPACING_TOLERANCE_MM,
-        ),
-    ]
-    faults = []
-    for code, what, hazard, limit, agrees in agreements:
-        odd = [item for item in slices if not agrees(item)]
-        if odd:
-            minority = min(odd, [item for item in slices if agrees(item)], key=len)
-            faults.append(
-                Fault(
-                    code,
-                    what,
-                    value=f"{len(minority)} of {len(slices)} slices, origins at "
-                    + listed([_point(item.position_mm) for item in minority])
-                    + " mm LPS",
-                    limit=limit,
-                    next_step="export the CT series alone, without other reconstructions",
-                    hazard=hazard,
-                )
-            )
-    return faults
-
-
-def _differs(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> float:
-    return max(abs(x - y) for x, y in zip(a or (), b or (), strict=True))
-
-
 def _axes(slices: Sequence[SliceHeader]) -> tuple[NDArray[np.float64], list[Fault]]:
     """Orthonormal i, j and normal directions, mean over the slices like the first one."""
     first = slices[0]
     alike = [
         item.orientation
         for item in slices
-        if _differs(item.orientation, first.orientation) <= ORIENTATION_TOLERANCE
+        if differs(item.orientation, first.orientation) <= ORIENTATION_TOLERANCE
     ]
     row, column = np.mean(np.array(alike, float), axis=0).reshape(2, 3)
     lengths = np.linalg.norm(row), np.linalg.norm(column)
@@ -311,15 +255,20 @@ def _uneven(stack: SliceStack) -> list[Fault]:
     return faults
 
 
-def _tilted(stack: SliceStack) -> list[Fault]:
-    if stack.tilt_deg <= TILT_TOLERANCE_DEG:
+def _tilted(stack: SliceStack, *, alone: bool) -> list[Fault]:
+    """A tilt that cannot be resampled: beside any other fault, or steeper than a gantry leans."""
+    lean = abs(stack.tilt_deg)
+    if lean <= (MAX_TILT_DEG if alone else TILT_TOLERANCE_DEG):
         return []
     return [
         Fault(
             "gantry-tilt",
-            "the slices are sheared against each other: the gantry was tilted",
-            value=f"{stack.tilt_deg:.2f} deg",
-            limit=f"{TILT_TOLERANCE_DEG:g} deg",
+            "the slices are sheared against each other by more than a gantry tilts"
+            if alone
+            else "the slices are sheared against each other, and that is not all: "
+            "only an even, complete stack with one tilt can be resampled",
+            value=stack.tilt.words,
+            limit=f"{MAX_TILT_DEG if alone else TILT_TOLERANCE_DEG:g} deg",
             next_step="reconstruct or acquire the CT without gantry tilt",
             hazard="H02",
         )
@@ -376,14 +325,3 @@ def _corners(stack: SliceStack) -> list[Fault]:
             hazard="H03",
         )
     ]
-
-
-def _point(position: tuple[float, ...] | None) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in position or ()) + ")"
-
-
-def listed(items: object) -> str:
-    """Up to a dozen entries, and how many more there are."""
-    entries = list(items)  # type: ignore[call-overload]
-    more = f" and {len(entries) - _LISTED} more" if len(entries) > _LISTED else ""
-    return ", ".join(entries[:_LISTED]) + more

@@ -8,6 +8,32 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+@dataclass(frozen=True, eq=False)
+class Acquisition:
+    """What the scanner saw, where the volume's grid is wider and air fills the rest.
+
+    Attributes
+    ----------
+    ijk_to_lps : ndarray, shape (4, 4)
+        Voxel indices (i, j, k, 1) of the slices as acquired to LPS mm; its axes are not
+        perpendicular: slice follows slice aside. Read-only.
+    size_ijk : tuple of int
+        Columns, rows and slices as acquired.
+    tilt_deg : float
+        Angle between the line of slice origins and the slice normal; sign by
+        `hexafix.imaging.gantry_tilt.GantryTilt`.
+    """
+
+    ijk_to_lps: NDArray[np.float64]
+    size_ijk: tuple[int, int, int]
+    tilt_deg: float
+
+    def __post_init__(self) -> None:
+        affine = np.array(self.ijk_to_lps, float)
+        affine.setflags(write=False)
+        object.__setattr__(self, "ijk_to_lps", affine)
+
+
 @dataclass(frozen=True, slots=True)
 class ImageSource:
     """Where a volume came from, free of patient identity.
@@ -18,12 +44,16 @@ class ImageSource:
         ``dicom``, ``nrrd``, ``nifti``, ``metaimage`` or ``memory``.
     sha256 : str
         Hash over geometry and voxels: the same image gives the same hash however it was stored.
+        Of a tilted series the acquired slices and places are hashed.
     slice_thickness_mm : float or None
         Nominal slice thickness where the header tells it.
     laterality, body_part, patient_position : str or None
         Header words that gates compare with the case.
     warnings : tuple of str
         What the reader wants shown to the user.
+    acquisition : Acquisition or None
+        What was acquired, where slices of a tilted gantry were moved to a perpendicular grid;
+        None where the voxels are the acquired ones.
     """
 
     kind: str = "memory"
@@ -33,6 +63,7 @@ class ImageSource:
     body_part: str | None = None
     patient_position: str | None = None
     warnings: tuple[str, ...] = field(default=())
+    acquisition: Acquisition | None = None
 
 
 @dataclass(frozen=True, eq=False)

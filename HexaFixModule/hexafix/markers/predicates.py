@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.imaging.volume import Volume
+from hexafix.imaging.volume import Acquisition, Volume
 from hexafix.markers.crop import Crop
 from hexafix.markers.directions import neighbour_average, sphere_directions
 from hexafix.markers.model import SIGMA_RANGE_MM, ModelFit
@@ -40,21 +40,30 @@ CORE_SHARE = 0.22
 """Difference of the core's HU from the others', over their contrast."""
 
 
-def border_distance_mm(volume: Volume, center_mm: NDArray[np.float64]) -> float:
-    """Distance of a point, LPS mm, from the nearest face of the volume."""
-    index = volume.ijk_from_lps(center_mm)
-    per_mm = np.linalg.norm(np.linalg.inv(volume.ijk_to_lps[:3, :3]), axis=1)
-    low, high = (index + 0.5) / per_mm, (np.array(volume.size_ijk) - 0.5 - index) / per_mm
+def border_distance_mm(region: Volume | Acquisition, center_mm: NDArray[np.float64]) -> float:
+    """Distance of a point, LPS mm, from the nearest face of a grid; its axes may be sheared."""
+    inverse = np.linalg.inv(region.ijk_to_lps[:3, :3])
+    index = inverse @ (center_mm - region.ijk_to_lps[:3, 3])
+    per_mm = np.linalg.norm(inverse, axis=1)
+    low, high = (index + 0.5) / per_mm, (np.array(region.size_ijk) - 0.5 - index) / per_mm
     return float(min(low.min(), high.min()))
 
 
 def border_failure(volume: Volume, center_mm: NDArray[np.float64], radius_mm: float) -> str | None:
-    """Reason when the ball is not wholly inside the volume."""
+    """Reason when the ball is not wholly inside the volume, and inside what was acquired.
+
+    The grid of a tilted series is wider than its slices: what air fills there ends a ball as the
+    volume's own faces do.
+    """
     limit = radius_mm + max(BORDER_MM, float(volume.spacing_mm.max()))
-    distance = border_distance_mm(volume, center_mm)
-    if distance >= limit:
-        return None
-    return f"border: {distance:.1f} mm from the edge of the volume, limit {limit:.1f} mm"
+    regions = {"the volume": volume, "the acquired slices": volume.source.acquisition}
+    for name, region in regions.items():
+        if region is None:
+            continue
+        distance = border_distance_mm(region, center_mm)
+        if distance < limit:
+            return f"border: {distance:.1f} mm from the edge of {name}, limit {limit:.1f} mm"
+    return None
 
 
 def size_failure(found_mm: float, radius_mm: float) -> str | None:

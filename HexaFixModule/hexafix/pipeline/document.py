@@ -94,6 +94,7 @@ def _numbered_balls(case: Case, recognised: Recognised) -> list[dict[str, Any]]:
 
 def _image(recognised: Recognised) -> dict[str, Any]:
     volume = recognised.volume
+    acquired = volume.source.acquisition
     return {
         "frame": "LPS",
         "kind": volume.source.kind,
@@ -101,6 +102,8 @@ def _image(recognised: Recognised) -> dict[str, Any]:
         "size_ijk": list(volume.size_ijk),
         "spacing_mm": rounded(volume.spacing_mm, 6),
         "ijk_to_lps": rounded(volume.ijk_to_lps, 9),
+        "resampled": acquired is not None,
+        "gantry_tilt_deg": None if acquired is None else rounded(acquired.tilt_deg, 4),
         "warnings": [*volume.source.warnings, *recognised.balls.warnings],
     }
 

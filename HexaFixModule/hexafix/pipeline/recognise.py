@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,10 @@ def find_markers(
     series_instance_uid: str | None = None,
     progress: Progress = silent,
 ) -> BallSet:
-    """Find the balls of an image on disk."""
+    """Find the balls of an image on disk; what its reader warns of stands before their warnings."""
     volume = read_volume(image, series_instance_uid=series_instance_uid, progress=progress)
-    return find_balls(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
+    balls = find_balls(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
+    return replace(balls, warnings=(*volume.source.warnings, *balls.warnings))
 
 
 def read_case_image(case: Case, *, progress: Progress = silent) -> Volume:
@@ -165,5 +167,6 @@ def _gates(
         gates.towards_the_head(case.limb.bone, proximal.pose, distal.pose),
         gates.numbering_unique(numbering.margin_mm, numbering.settled_by),
         gates.sides_agree(case.limb.side, volume.source.laterality),
+        gates.limbs_agree(case.limb.bone, volume.source.body_part),
     ]
     return tuple(gate for gate in found if gate is not None)
