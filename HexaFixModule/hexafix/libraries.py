@@ -10,9 +10,9 @@ from hexafix.errors import Fault
 
 LIBRARIES = (
     *("numpy", "scipy", "pydicom", "SimpleITK", "vtk", "typst", "pypdfium2", "pydantic"),
-    *("pylibjpeg", "pylibjpeg-libjpeg", "pylibjpeg-openjpeg"),
+    *("pylibjpeg", "pylibjpeg-libjpeg", "pylibjpeg-openjpeg", "pillow"),
 )
-"""What reads the image, computes and prints; the last three decode compressed DICOM."""
+"""What reads the image, computes and prints; the last four decode compressed DICOM."""
 
 NOT_INSTALLED = "not installed"
 
@@ -40,7 +40,8 @@ def versions() -> dict[str, str]:
 
 def named(library: str) -> str:
     """The library, or several joined by " + ", with version."""
-    return " with ".join(f"{name} {version_of(name)}" for name in library.split(" + "))
+    first, *rest = (f"{name} {version_of(name)}" for name in library.split(" + "))
+    return f"{first} with {', '.join(rest)}" if rest else first
 
 
 def untrusted(check: str, library: str, *, expected: str, found: str) -> Fault:

@@ -22,10 +22,19 @@ from hexafix.errors import HexaFixError
 
 NOTICE = "Research software, not a medical device."
 
+
+def version_text() -> str:
+    """HexaFix and the libraries whose fault could matter, one a line."""
+    from hexafix.libraries import versions
+
+    lines = (f"{name} {version}" for name, version in versions().items())
+    return "\n".join([f"hexafix {__version__}", *lines])
+
+
 app = App(
     name="hexafix",
     help=f"From a CT of a hexapod external fixator to a verified strut schedule. {NOTICE}",
-    version=f"hexafix {__version__}",
+    version=version_text,
     help_format="plaintext",
 )
 
@@ -258,6 +267,17 @@ def verify(
     verdict = verify_export(folder)
     print_json(verdict) if json else print(verdict_text(verdict))
     return 0 if verdict["verified"] else 3
+
+
+@app.command
+def selftest(*, json: Json = False) -> int:
+    """Check the installed libraries against known answers, as plan does before it starts."""
+    from hexafix.cli.show import self_test_text
+    from hexafix.selftest import run_self_test, self_test_document
+
+    document = self_test_document(run_self_test(foreign=True))
+    print_json(document) if json else print(self_test_text(document))
+    return 0 if document["passed"] else 3
 
 
 @app.command

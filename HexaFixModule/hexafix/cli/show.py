@@ -143,3 +143,21 @@ def series_text(document: dict[str, Any]) -> str:
         lines.append(f"warning: the images are of {document['patients']} different patients")
     lines += [f"passed over: {row['files']} x {row['reason']}" for row in document["skipped"]]
     return "\n".join(lines)
+
+
+def self_test_text(document: dict[str, Any]) -> str:
+    """Every check of the self-test, its library and its time."""
+    lines = []
+    for check in document["checks"]:
+        mark = "pass" if check["passed"] else "FAIL"
+        lines.append(
+            f"  {mark}  {check['name']}: {check['expected']}; {check['library']}, "
+            f"{1000 * check['seconds']:.0f} ms"
+        )
+        if not check["passed"]:
+            lines.append(f"        found: {check['found']}")
+    head = "The installed libraries give the known answers."
+    if not document["passed"]:
+        faults = document["refused"]
+        head = "\n".join(f"REFUSED [{fault['hazard']}] {fault['message']}" for fault in faults)
+    return "\n".join([head, *lines])

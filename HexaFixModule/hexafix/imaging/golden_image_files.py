@@ -8,7 +8,7 @@ SimpleITK 2.4.0 to 2.5.6 mirrored in one of their readers.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import product
 from math import inf, sqrt
 from pathlib import Path
@@ -157,7 +157,7 @@ class ItkProof:
         """What to ask the child for first: path and reader."""
         return [str(self._path), self._reader]
 
-    def check(self, results: Any) -> None:
+    def check(self, results: Iterator[tuple[dict[str, Any], NDArray]]) -> None:
         """Take the golden image off the child's results and compare it.
 
         Raises
@@ -166,7 +166,8 @@ class ItkProof:
             If it is not what it must be.
         """
         try:
-            worst = _worst_mm(*next(results, ({}, np.empty(0))))
+            about, voxels = next(results, ({}, np.empty(0)))
+            worst = _worst_mm(about, voxels)
             found = f"{worst:.4g} mm" if worst < inf else "other voxels"
         except ImageRefused as refused:
             worst, found = inf, str(refused.faults[0].value or refused.faults[0].code)

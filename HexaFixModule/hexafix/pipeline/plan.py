@@ -29,6 +29,7 @@ from hexafix.pipeline.recognise import read_case_image, recognise
 from hexafix.pipeline.recognised import Recognised
 from hexafix.pipeline.strut_witness import WeighedStruts, weigh_struts
 from hexafix.progress import Progress, silent
+from hexafix.selftest import require_self_test
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +84,9 @@ def plan_correction(
     Raises
     ------
     Refused
-        If a gate is red or a step refuses.
+        If the self-test fails, a gate is red or a step refuses.
     """
+    require_self_test()
     recognised = recognise_checked(
         case, volume=volume, accept_relaxed_layout=accept_relaxed_layout, progress=progress
     )

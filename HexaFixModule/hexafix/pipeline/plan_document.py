@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ from hexafix import __version__
 from hexafix.correction import FragmentMotion, StrutSchedule
 from hexafix.correction.landmarks import Landmarks, fit_landmarks
 from hexafix.geometry import Pose
+from hexafix.libraries import versions
 from hexafix.pipeline import document
 from hexafix.pipeline.numbers import pose_document, rounded
 from hexafix.pipeline.plan import Plan
@@ -20,7 +19,6 @@ NOTICE = (
     "Research software. Not a medical device. Not to be followed unless a surgeon has checked and "
     "approved it."
 )
-LIBRARIES = ("numpy", "scipy", "SimpleITK", "pydicom", "pydantic", "typst", "pypdfium2")
 LEFT = {
     "fused": "image and readings were weighed by their uncertainties and both ring poses corrected",
     "additive": "the difference of the pose vectors was subtracted from the target (Eq. 32)",
@@ -56,17 +54,6 @@ def plan(plan: Plan) -> dict[str, Any]:
         "schedule": _schedule(plan.schedule),
         "gates": [gate.as_json() for gate in plan.gates],
     }
-
-
-def versions() -> dict[str, str]:
-    """Versions of what computed the plan."""
-    found = {"python": platform.python_version()}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
 
 
 def _struts(plan: Plan) -> dict[str, Any]:

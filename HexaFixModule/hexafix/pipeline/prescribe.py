@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexafix import export, gates
 from hexafix.case import Case
@@ -20,6 +20,10 @@ from hexafix.report.picture import SceneRenderer
 from hexafix.report.scene import SceneGeometry, sample_bone
 from hexafix.report.tables import markers_mrk_json, schedule_csv
 
+if TYPE_CHECKING:
+    from hexafix.imaging.patient_identity import PatientIdentity
+from hexafix.selftest import require_self_test
+
 
 def plan_and_export(
     case: Case,
@@ -27,10 +31,13 @@ def plan_and_export(
     *,
     volume: Volume | None = None,
     accept_relaxed_layout: bool = False,
+    identified_pdf: bool = False,
     renderer: SceneRenderer | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """The whole chain: plan, recompute by another road, print, read back, write.
+
+    Before the image is read, the libraries must give known answers (H54).
 
     Parameters
     ----------
@@ -39,6 +46,9 @@ def plan_and_export(
         Where the export goes, all or nothing.
     volume, accept_relaxed_layout, progress
         As in `plan_correction`.
+    identified_pdf : bool
+        Whether the prescription, and it alone, names the patient as the CT's headers do; only
+        then they are read for it, and the folder is made for its owner alone.
     renderer : SceneRenderer, optional
         Started by the caller before it loaded this room, so that both load side by side; it is
         closed here.
@@ -51,10 +61,13 @@ def plan_and_export(
     Raises
     ------
     Refused
-        If a gate is red; nothing is written and an older export stays as it is.
+        If the self-test fails or a gate is red; nothing is written and an older export stays as
+        it is.
     """
     export.check_target(folder)
     with renderer or SceneRenderer() as renderer:
+        identity = _identity(case, progress) if identified_pdf else None
+        require_self_test()
         recognised = recognise_checked(
             case, volume=volume, accept_relaxed_layout=accept_relaxed_layout, progress=progress
         )
@@ -69,13 +82,15 @@ def plan_and_export(
         progress("recompute by another road", 1.0)
         progress("set the prescription", 0.0)
         # typst keeps what does not change, so the pages are set before the picture is there
-        prescription_pdf(document)
+        prescription_pdf(document, identity=identity)
         progress("set the prescription", 0.5)
         files = {
             "plan.json": json_bytes(document),
             "schedule.csv": schedule_csv(document),
             "markers.mrk.json": markers_mrk_json(document),
-            "prescription.pdf": prescription_pdf(document, pictures=renderer.result()),
+            "prescription.pdf": prescription_pdf(
+                document, pictures=renderer.result(), identity=identity
+            ),
         }
     from hexafix.verify import check_printed
 
@@ -88,13 +103,22 @@ def plan_and_export(
             next_step="report this case; nothing was written",
         )
     progress("set the prescription", 1.0)
-    export.write_export(files, folder)
+    export.write_export(files, folder, private=identified_pdf)
     return document
 
 
 def json_bytes(document: dict[str, Any]) -> bytes:
     """A document as it is written: the same content gives the same bytes."""
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def _identity(case: Case, progress: Progress) -> PatientIdentity:
+    # Not at the top: only an identified prescription needs it.
+    from hexafix.imaging.patient_identity import read_patient_identity
+
+    return read_patient_identity(
+        case.image_path, series_instance_uid=case.series_instance_uid, progress=progress
+    )
 
 
 def _scene(case: Case, recognised: Recognised) -> SceneGeometry:
