@@ -1,7 +1,7 @@
 """Layout rules, uniqueness and predicted pose error (Section 4)."""
 
 from hexafix.accuracy.advice import Suggestion, better_layout, check_layouts
-from hexafix.accuracy.advised import Advice, AdviceRules, RingTask
+from hexafix.accuracy.advised import Advice, AdviceRules, RingPlaces, RingTask
 from hexafix.accuracy.advisor import advise
 from hexafix.accuracy.joint_error import ErrorTarget
 from hexafix.accuracy.layout_check import LayoutCheck, LayoutVerdict, angle_rule, check_layout
@@ -13,6 +13,7 @@ __all__ = [
     "ErrorTarget",
     "LayoutCheck",
     "LayoutVerdict",
+    "RingPlaces",
     "RingTask",
     "Suggestion",
     "advise",

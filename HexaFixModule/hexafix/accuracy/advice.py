@@ -8,7 +8,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hexafix.accuracy.advised import AdviceRules, RingPlaces, RingTask
+from hexafix.accuracy.advisor import advise
 from hexafix.accuracy.jacobian import isotropic_covariances, volume_error
+from hexafix.accuracy.layout_candidates import MARKERS
 from hexafix.accuracy.layout_check import (
     PREFERRED_DEG,
     UNIQUENESS_TARGET_MM,
@@ -24,6 +27,7 @@ from hexafix.accuracy.uniqueness import (
     numberings_around,
     wrong_numberings,
 )
+from hexafix.errors import LayoutRejected
 from hexafix.hardware import MarkerLayout, MarkerSite
 from hexafix.recognition.choices import UNIQUENESS_LIMIT_MM
 from hexafix.recognition.least_squares import IMAGE_SIGMA_MM, INSTALLATION_SIGMA_MM
@@ -49,6 +53,8 @@ class Suggestion:
         RMS of the best wrong numbering, or of the other ring taken for this one.
     error_mm, error_rad : float
         Expected volume error of the least-squares pose.
+    move_words : tuple of str
+        The moves in words where heights change too.
     """
 
     layout: MarkerLayout
@@ -56,14 +62,15 @@ class Suggestion:
     uniqueness_mm: float
     error_mm: float
     error_rad: float
+    move_words: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
         """The suggestion as one sentence."""
-        moved = " and ".join(
-            f"move marker {number} from {old:g} to {new:g} degrees"
-            for number, old, new in self.moves
-        )
+        words = self.move_words or [
+            f"marker {number} from {old:g} to {new:g} degrees" for number, old, new in self.moves
+        ]
+        moved = " and ".join(f"move {move}" for move in words)
         return (
             f"{moved}: unique by {self.uniqueness_mm:.1f} mm, predicted error"
             f" {self.error_mm:.2f} mm, {np.degrees(self.error_rad):.2f} degrees"
@@ -76,8 +83,18 @@ def check_layouts(
     *,
     sigma_image_mm: float = IMAGE_SIGMA_MM,
     sigma_installation_mm: ArrayLike = INSTALLATION_SIGMA_MM,
+    places: tuple[RingPlaces | None, RingPlaces | None] = (None, None),
 ) -> LayoutCheck:
-    """Check both rings' layouts and advise better ones; arguments as in `check_layout`."""
+    """Check both rings' layouts and advise better ones.
+
+    Parameters
+    ----------
+    proximal, distal : MarkerLayout
+    sigma_image_mm, sigma_installation_mm
+        As in `check_layout`.
+    places : pair of RingPlaces or None
+        Where each ring can carry markers; without, markers are moved to any angle.
+    """
     verdicts = [
         check_layout(
             layout, sigma_image_mm=sigma_image_mm, sigma_installation_mm=sigma_installation_mm
@@ -90,8 +107,8 @@ def check_layouts(
     )
     advice: list[str] = []
     built = proximal
-    for side, layout, verdict in zip(
-        ("proximal", "distal"), (proximal, distal), verdicts, strict=True
+    for side, layout, verdict, known in zip(
+        ("proximal", "distal"), (proximal, distal), verdicts, places, strict=True
     ):
         other = built if side == "distal" else None
         reasons = _reasons(verdict)
@@ -99,8 +116,13 @@ def check_layouts(
             reasons.append(f"it can be taken for the proximal ring (RMS {exchange:.2f} mm)")
         if not reasons:
             continue
-        better = better_layout(layout, other=other, sigma_mm=sigma)
-        proposal = better.words if better else "no better angles were found; add a marker"
+        if known is not None and MARKERS[0] <= len(layout) <= MARKERS[1]:
+            better = best_on_places(layout, known, other=other, sigma_mm=sigma)
+            missing = "the free places allow no better layout; add a marker or free a hole"
+        else:
+            better = better_layout(layout, other=other, sigma_mm=sigma)
+            missing = "no better angles were found; add a marker"
+        proposal = better.words if better else missing
         advice.append(f"{side} ring: {'; '.join(reasons)}; {proposal}")
         if side == "proximal" and better is not None:
             built = better.layout
@@ -115,6 +137,29 @@ def check_layouts(
             " others, on one ring, would"
         )
     return LayoutCheck(verdicts[0], verdicts[1], exchange, tuple(advice))
+
+
+def best_on_places(
+    layout: MarkerLayout, known: RingPlaces, *, other: MarkerLayout | None, sigma_mm: float
+) -> Suggestion | None:
+    """The best layout of a ring's free holes with as many markers; as `better_layout`."""
+    task = RingTask("ring", known.places, len(layout), known.target, layout)
+    rules = AdviceRules(sigma_image_mm=sigma_mm, sigma_installation_mm=0.0)
+    try:
+        found = advise([task], rules=rules, top=1, other=other)
+    except LayoutRejected:
+        return None
+    best = found.proposals[0]
+    ring, exchange = best.rings[0], best.exchange_mm
+    unique = ring.verdict.uniqueness_mm
+    return Suggestion(
+        ring.layout,
+        tuple((move.number, move.from_deg, move.to_deg) for move in ring.moves),
+        unique if exchange is None else min(unique, exchange),
+        ring.verdict.predicted_error_mm or np.nan,
+        ring.verdict.predicted_error_rad or np.nan,
+        tuple(move.words for move in ring.moves),
+    )
 
 
 def _reasons(verdict: LayoutVerdict) -> list[str]:

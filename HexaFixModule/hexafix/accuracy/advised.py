@@ -58,6 +58,14 @@ class AdviceRules:
         return float(np.hypot(self.sigma_image_mm, self.sigma_installation_mm))
 
 
+@dataclass(frozen=True, slots=True)
+class RingPlaces:
+    """Where a ring can carry markers and where its error counts."""
+
+    places: Places
+    target: ErrorTarget
+
+
 @dataclass(frozen=True, eq=False)
 class RingTask:
     """One ring to be advised on.

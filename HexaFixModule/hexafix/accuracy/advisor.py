@@ -29,8 +29,8 @@ from hexafix.recognition.choices import UNIQUENESS_LIMIT_MM
 FIRST_PAIRED = 32
 """Layouts of each ring paired at first; twice as many each time they do not suffice."""
 
-PAIR_BATCH = 64
-"""Pairs tested at once."""
+PAIR_BATCH, SINGLE_BATCH = 64, 8
+"""Pairs tested at once, and layouts of a single ring."""
 
 MIRROR_NEEDS_MORE_THAN = 3
 """So many markers always lie in one plane and cannot show a mirrored image."""
@@ -81,7 +81,8 @@ def advise(
         found = _pairs(searches[0], searches[1], rules, top)
     if not found:
         raise _nothing(tasks, rules)
-    proposals = tuple(_proposal(tasks, rings, rules, other) for _, rings in found)
+    known: dict[tuple[str, MarkerLayout], AssessedRing] = {}
+    proposals = tuple(_proposal(tasks, rings, rules, other, known) for _, rings in found)
     present = [assess(t.present, t.target, rules) if t.present else None for t in tasks]
     return _answer(tasks, searches, rules, proposals, present, other)
 
@@ -154,7 +155,7 @@ def _singles(
     found = []
     start = 0
     while len(found) < top:
-        items = search.upto(start + PAIR_BATCH)[start:]
+        items = search.upto(start + max(top, SINGLE_BATCH))[start:]
         if not items:
             break
         start += len(items)
@@ -170,7 +171,9 @@ def _singles(
             choice = _nearest([search], [item], ways)
             if choice is not None:
                 found.append((item, choice))
-    return found[:top]
+            if len(found) == top:
+                break
+    return found
 
 
 def _pairs(
@@ -256,12 +259,15 @@ def _proposal(
     rings: Sequence[Placed],
     rules: AdviceRules,
     other: MarkerLayout | None,
+    known: dict[tuple[str, MarkerLayout], AssessedRing],
 ) -> Proposal:
-    """The rings with all their figures."""
-    assessed = tuple(
-        assess(ring.layout, task.target, rules, places=ring.places, moves=ring.moves)
-        for task, ring in zip(tasks, rings, strict=True)
-    )
+    """The rings with all their figures; `known` holds those of earlier proposals."""
+    for task, ring in zip(tasks, rings, strict=True):
+        if (task.name, ring.layout) not in known:
+            known[task.name, ring.layout] = assess(
+                ring.layout, task.target, rules, places=ring.places, moves=ring.moves
+            )
+    assessed = tuple(known[task.name, ring.layout] for task, ring in zip(tasks, rings, strict=True))
     return Proposal(
         assessed,
         float(np.sqrt(sum(ring.error_mm**2 for ring in assessed))),

@@ -12,11 +12,11 @@ from hexafix.hardware import Fixator
 
 
 def marker_faults(markers: dict[str, Any], where: str = "markers") -> Iterator[Fault]:
-    """Numbers used twice, and markers of one ring that would touch."""
+    """Numbers used twice; a single ring has its list at ``markers``."""
     prefix = f"{where}." if where else ""
     seen: dict[int, str] = {}
-    for ring in ("proximal", "distal"):
-        for place, marker in enumerate(markers[ring]):
+    for ring in ("proximal", "distal", "markers"):
+        for place, marker in enumerate(markers.get(ring, ())):
             path = f"{prefix}{ring}[{place}].number"
             if marker["number"] in seen:
                 yield Fault(

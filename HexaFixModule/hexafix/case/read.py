@@ -60,7 +60,7 @@ def case_from_document(
 ) -> Case:
     """A case from the bytes of a case file that lies in `folder`; see `load_case`."""
     content = parse_json_object(raw, what="case file", where="case.json")
-    faults, broken = _schema_faults(CaseFile, raw)
+    faults, broken = schema_faults(CaseFile, raw)
     fixator, definition, more = _resolve_fixator(content, broken, folder)
     faults += more
     faults += _cross_faults(content, broken, fixator)
@@ -106,16 +106,16 @@ def load_layouts(path: Path) -> tuple[MarkerLayout, MarkerLayout]:
     if "case_id" in content or "markers" in content:
         case = load_case(path, needs_image=False, plannable=False)
         return case.proximal, case.distal
-    faults, broken = _schema_faults(LayoutFile, raw)
+    faults, broken = schema_faults(LayoutFile, raw)
     if not broken & {"proximal", "distal"}:
         faults += checks.marker_faults(content, where="")
     if faults:
         raise InputError(*faults)
     model = LayoutFile.model_validate_json(raw)
-    return _layout(model.proximal), _layout(model.distal)
+    return layout_of(model.proximal), layout_of(model.distal)
 
 
-def _schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], set[str]]:
+def schema_faults(schema: type[BaseModel], raw: bytes) -> tuple[list[Fault], set[str]]:
     """Faults against the schema, and the top-level keys that hold one."""
     try:
         schema.model_validate_json(raw)
@@ -232,7 +232,8 @@ def _image_path(content: dict[str, Any], broken: set[str], folder: Path) -> Path
     return (folder / content["image"]["path"]).resolve()
 
 
-def _layout(markers: list[Any]) -> MarkerLayout:
+def layout_of(markers: list[Any]) -> MarkerLayout:
+    """The layout of `schema.Marker` rows, radians inside."""
     sites = [
         MarkerSite(m.number, m.radius_mm, float(np.radians(m.sweep_deg)), m.height_mm)
         for m in markers
@@ -295,8 +296,8 @@ def _build(
         series_instance_uid=model.image.series_instance_uid,
         fixator=fixator,
         ball_diameter_mm=model.markers.ball_diameter_mm,
-        proximal=_layout(model.markers.proximal),
-        distal=_layout(model.markers.distal),
+        proximal=layout_of(model.markers.proximal),
+        distal=layout_of(model.markers.distal),
         numbering=numbering,
         strut_readings_mm=None
         if model.strut_readings_mm is None

@@ -58,12 +58,29 @@ class Markers(_Strict):
     distal: Annotated[list[Marker], Field(min_length=3, max_length=24)]
 
 
+class Holes(_Strict):
+    """Where each ring can carry markers; the rings' own schema is in `hexafix.hardware.holes`."""
+
+    proximal: dict[str, Any] | None = None
+    distal: dict[str, Any] | None = None
+
+
 class LayoutFile(_Strict):
-    """A layout alone, for ``check-layout`` before any CT."""
+    """A layout alone, for ``check-layout`` and ``advise`` before any CT."""
 
     schema_version: Literal[1]
     proximal: Annotated[list[Marker], Field(min_length=3, max_length=24)]
     distal: Annotated[list[Marker], Field(min_length=3, max_length=24)]
+    ball_diameter_mm: Annotated[float, Field(ge=2.0, le=40.0)] | None = None
+    holes: Holes | None = None
+
+
+class RingFile(_Strict):
+    """A single ring for ``advise``: its places and, where there is one, its layout."""
+
+    schema_version: Literal[1]
+    holes: dict[str, Any]
+    markers: Annotated[list[Marker], Field(min_length=3, max_length=24)] | None = None
     ball_diameter_mm: Annotated[float, Field(ge=2.0, le=40.0)] | None = None
 
 

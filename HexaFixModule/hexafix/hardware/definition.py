@@ -12,13 +12,15 @@ import numpy as np
 
 from hexafix.errors import Fault, HardwareDefinitionError, InputError
 from hexafix.hardware.fixator import Fixator, Ring, StrutType
+from hexafix.hardware.holes import Places, places_from_document
 from hexafix.paths import resources
 from hexafix.strict_json import read_json_object
 
 SCHEMA_VERSION = 1
 _TOP = ("schema_version", "id", "name", "source", "proximal", "distal", "strut")
-_RING = ("joints_mm", "thickness_mm", "outer_radius_mm")
+_RING = ("joints_mm", "thickness_mm", "outer_radius_mm", "holes")
 _STRUT = ("min_mm", "max_mm", "scale_offset_mm")
+_OPTIONAL = ("scale_offset_mm", "holes")
 CLOSEST_JOINTS_MM = 1.0
 """Two joint centres of a ring nearer than this are a typing error."""
 
@@ -145,7 +147,7 @@ class _Check:
             if key not in known:
                 self.fault("unknown-key", "unknown key", f"{where}.{key}", None, ", ".join(known))
         for key in known:
-            if key not in value and key != "scale_offset_mm":
+            if key not in value and key not in _OPTIONAL:
                 self.fault("missing-key", "this key is missing", f"{where}.{key}")
         return {key: value[key] for key in known if key in value}
 
@@ -174,9 +176,18 @@ class _Check:
         thickness = self.number(entries, "thickness_mm", where, 0.0)
         radius = self.number(entries, "outer_radius_mm", where, 0.0)
         joints = self.joints(entries["joints_mm"], where) if "joints_mm" in entries else None
+        holes = self.holes(entries["holes"], f"{where}.holes") if "holes" in entries else None
         if joints is None or len(self.faults) > before or not math.isfinite(thickness + radius):
             return None
-        return Ring(joints, thickness, radius)
+        return Ring(joints, thickness, radius, holes)
+
+    def holes(self, value: Any, where: str) -> Places | None:
+        """Where marker rods can be put, if the definition says so."""
+        try:
+            return places_from_document(value, where=where)
+        except HardwareDefinitionError as error:
+            self.faults += error.faults
+            return None
 
     def joints(self, value: Any, ring: str) -> np.ndarray | None:
         where = f"{ring}.joints_mm"

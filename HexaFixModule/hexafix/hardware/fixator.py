@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexafix.hardware.holes import Places
+
 
 @dataclass(frozen=True, eq=False)
 class Ring:
@@ -20,11 +22,14 @@ class Ring:
         Thickness of the plate; the ring frame's origin lies in the upper plane.
     outer_radius_mm : float
         Outer radius of the plate.
+    holes : HoleCircle or SiteList, optional
+        Where marker rods can be put, where the definition says so.
     """
 
     joints_mm: NDArray[np.float64]
     thickness_mm: float
     outer_radius_mm: float
+    holes: Places | None = None
 
     def __post_init__(self) -> None:
         joints = np.array(self.joints_mm, float)

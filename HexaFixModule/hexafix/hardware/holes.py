@@ -226,5 +226,8 @@ def _is_number(value: Any) -> bool:
 
 
 def _fault(code: str, what: str, where: str, value: Any = None, limit: str | None = None) -> Fault:
-    shown = None if value is None else repr(value)[:60]
+    # Only numbers are quoted: a text could name somebody (H51).
+    numbers = value if isinstance(value, list | tuple) else [value]
+    plain = all(isinstance(number, int | float) for number in numbers)
+    shown = None if value is None else repr(value)[:60] if plain else type(value).__name__
     return Fault(code, what, shown, limit, "correct the holes of the ring", "H23", where)
