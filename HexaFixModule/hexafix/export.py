@@ -30,7 +30,7 @@ FILES = ("plan.json", "schedule.csv", "prescription.pdf", "markers.mrk.json")
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
-def write_export(files: Mapping[str, bytes], folder: Path) -> None:
+def write_export(files: Mapping[str, bytes], folder: Path, *, private: bool = False) -> None:
     """Put `files` and their manifest in place as `folder`, all or nothing.
 
     Parameters
@@ -39,6 +39,9 @@ def write_export(files: Mapping[str, bytes], folder: Path) -> None:
         File names (no folders) and contents.
     folder : Path
         Target; created, or replaced if it holds an older export.
+    private : bool
+        Whether only the owner may enter the folder (a file names the patient); else the user's
+        umask decides.
 
     Raises
     ------
@@ -54,7 +57,7 @@ def write_export(files: Mapping[str, bytes], folder: Path) -> None:
             _clear_leftovers(folder)
             staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.staging-", dir=folder.parent))
             try:
-                staging.chmod(0o777 & ~_umask())
+                staging.chmod(0o700 if private else 0o777 & ~_umask())
                 for name, content in {**files, MANIFEST: manifest(files)}.items():
                     _write_synced(staging / name, content)
                 _sync_folder(staging)

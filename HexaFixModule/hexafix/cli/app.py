@@ -228,6 +228,14 @@ def plan(
         bool,
         Parameter(negative="", help="Accept a layout that keeps only the relaxed angle rule."),
     ] = False,
+    identified_pdf: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Print the patient's name, id, birth date and the CT's date, as its headers have "
+            "them, on the prescription; no other file names the patient.",
+        ),
+    ] = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
@@ -247,8 +255,14 @@ def plan(
             load_case(case),
             out,
             accept_relaxed_layout=accept_relaxed_layout,
+            identified_pdf=identified_pdf,
             renderer=renderer,
             progress=progress,
+        )
+    if identified_pdf:
+        print(
+            "hexafix: prescription.pdf names the patient: handle it as patient data",
+            file=sys.stderr,
         )
     print_json(document) if json else print(plan_text(document, (*FILES, MANIFEST)))
     return 0

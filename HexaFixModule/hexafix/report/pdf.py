@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexafix.errors import HexaFixError, InputError
 from hexafix.paths import resources
 from hexafix.report import figures, words
 from hexafix.report.format import parse_date
+from hexafix.report.identity import identity_content
 from hexafix.report.patient import patient_content
 from hexafix.report.picture import ScenePictures, draw_pictures
 from hexafix.report.scene import SceneGeometry
 from hexafix.report.surgeon import plan_fingerprint, surgeon_tables
+
+if TYPE_CHECKING:
+    from hexafix.imaging.patient_identity import PatientIdentity
 
 LANGUAGES = ("en",)
 """Languages the prescription can be printed in."""
@@ -69,9 +73,12 @@ def _warnings(document: Mapping[str, Any]) -> list[str]:
 
 
 def prescription_content(
-    document: Mapping[str, Any], *, pictures: ScenePictures | None = None
+    document: Mapping[str, Any],
+    *,
+    pictures: ScenePictures | None = None,
+    identity: PatientIdentity | None = None,
 ) -> dict[str, Any]:
-    """All that the prescription shows, as strings."""
+    """All that the prescription shows, as strings; ``identity`` is null on a pseudonymous one."""
     plan = dict(document)
     scene = SceneGeometry.from_document(plan)
     if pictures is None:
@@ -93,11 +100,17 @@ def prescription_content(
         "figures": _figure_content(plan),
         "warnings": _warnings(document),
         "conventions": words.FRAME_CONVENTIONS,
+        "identity": None if identity is None else identity_content(identity),
+        "handling": words.PSEUDONYMOUS if identity is None else words.IDENTIFIED,
     }
 
 
 def prescription_pdf(
-    document: Mapping[str, Any], *, pictures: ScenePictures | None = None, language: str = "en"
+    document: Mapping[str, Any],
+    *,
+    pictures: ScenePictures | None = None,
+    language: str = "en",
+    identity: PatientIdentity | None = None,
 ) -> bytes:
     """The prescription for patient and surgeon.
 
@@ -110,6 +123,9 @@ def prescription_pdf(
         by lines.
     language : str
         ``en``.
+    identity : PatientIdentity, optional
+        Printed at the head of each page, by the user's explicit choice only; title and other
+        metadata stay pseudonymous.
 
     Returns
     -------
@@ -130,7 +146,7 @@ def prescription_pdf(
             limit=", ".join(LANGUAGES),
             next_step="choose one of these",
         )
-    return _compile(prescription_content(document, pictures=pictures))
+    return _compile(prescription_content(document, pictures=pictures, identity=identity))
 
 
 def _compile(content: dict[str, Any]) -> bytes:

@@ -104,6 +104,12 @@ def warning_signs(bone: str) -> list[str]:
     ]
 
 
+PSEUDONYMOUS = "Pseudonymous: this file does not name the patient"
+"""At the foot of each page of a prescription without identity."""
+
+IDENTIFIED = "IDENTIFIED: names the patient, handle as patient data"
+"""At the foot of each page of a prescription with the patient's identity."""
+
 FRAME_CONVENTIONS = [
     "Image frame {W}: the patient frame of the CT (DICOM LPS), millimetres. +x points to the "
     "patient's left, +y to the patient's back (posterior), +z to the patient's head (superior).",
