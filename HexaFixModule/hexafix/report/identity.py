@@ -92,8 +92,7 @@ def _printable(text: str) -> bool:
     try:
         typst.compile(
             (source + "#sys.inputs.text").encode(),
-            font_paths=[str(folder / "fonts").encode()],
-            ignore_system_fonts=True,
+            font_paths=typst.Fonts(include_system_fonts=False, font_paths=[str(folder / "fonts")]),
             sys_inputs={"text": text},
             pdf_standards=["a-3a", "ua-1"],
             format="pdf",

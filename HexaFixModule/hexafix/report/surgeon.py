@@ -14,6 +14,9 @@ from hexafix.report.format import format_deg, format_measure, format_mm, format_
 REJECTED_SHOWN = 6
 """Rejected candidates printed; the rest stand in plan.json."""
 
+LIBRARIES_A_ROW = 4
+"""So that a row stays on one line."""
+
 RINGS = ("proximal", "distal")
 
 
@@ -324,6 +327,15 @@ def hash_table(document: Mapping[str, Any]) -> Table:
     return Table("SHA-256 of the inputs and of this plan", ("of", "hash"), tuple(rows))
 
 
+def _library_rows(versions: Mapping[str, str]) -> list[tuple[str, str]]:
+    """A few libraries a row: a line that breaks at a hyphen is read back without it."""
+    named = [f"{name} {version}" for name, version in sorted(versions.items())]
+    rows = [
+        ", ".join(named[k : k + LIBRARIES_A_ROW]) for k in range(0, len(named), LIBRARIES_A_ROW)
+    ]
+    return [("with" if k == 0 else "and", row) for k, row in enumerate(rows)]
+
+
 def version_table(document: Mapping[str, Any]) -> Table:
     """Programs and image behind the plan."""
     image = document["image"]
@@ -332,7 +344,7 @@ def version_table(document: Mapping[str, Any]) -> Table:
     fixator = document["case"]["fixator"]
     rows = [
         ("HexaFix", document["hexafix_version"]),
-        ("with", ", ".join(f"{k} {v}" for k, v in sorted(document["versions"].items()))),
+        *_library_rows(document["versions"]),
         ("image", f"{image['kind']}, {size} voxels of {spacing} mm"),
         ("fixator", f"{fixator['id']}: {fixator['name']}"),
         ("source of its geometry", fixator.get("source") or "-"),
