@@ -34,6 +34,7 @@ LADDER = {
     "selftest": 9,
     "pipeline": 10,
     "benchmark": 11,
+    "scenarios": 11,
     "cli": 12,
     "__main__": 13,
 }
@@ -67,6 +68,8 @@ LIBRARIES = {
     "selftest": {"numpy", "scipy"},
     "pipeline": {"numpy", "scipy"},
     "cli": {"cyclopts", "rich"},
+    "study": {"numpy", "matplotlib", "joblib", "distributed"},
+    "scenarios": {"numpy", "pydicom"},
     "benchmark": {"numpy", "scipy", "SimpleITK", "skimage", "vtkmodules", "psutil"},
 }
 """What each room may use besides the standard library, anywhere in its files."""

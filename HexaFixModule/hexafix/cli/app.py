@@ -306,3 +306,23 @@ def benchmark(
     rows = run(names, quick=quick)
     print_json(rows) if json else print_rows(rows)
     return 0 if all(row["met"] for row in rows) else 1
+
+
+@app.command
+def scenarios(
+    *,
+    only: Annotated[str, Parameter(help="Ids with commas, such as S07,S12; none means all.")] = "",
+    jobs: Annotated[int, Parameter(help="Processes at once.")] = 1,
+    out: Annotated[
+        Path | None, Parameter(help="Folder for scenarios.md and scenarios.json.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Plan and judge the numbered clinical scenarios, all of them simulated."""
+    from hexafix.cli.scenarios import run_catalogue
+
+    with progress_bar(quiet=quiet) as progress:
+        document, text = run_catalogue(only, jobs=jobs, out=out, progress=progress)
+    print_json(document) if json else print(text)
+    return 0 if document["all_as_expected"] else 1
