@@ -8,9 +8,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates, spline_filter
+from scipy.ndimage import binary_dilation, map_coordinates, spline_filter
 
 from hexafix.imaging.volume import Volume
+
+MOVED_MM = 1e-4
+"""A slice that lies farther aside of the one before it was moved between its voxels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,19 @@ class Crop:
         noise = 1.4826 * float(np.median(np.abs(values - middle)))
         clipped = float(np.mean(values >= self.brightest))
         return middle, noise, clipped, float(np.quantile(values, 0.05))
+
+    def clipped(self, clip_hu: float) -> NDArray[np.bool_]:
+        """Voxels that the clipping spoils, shape (K, J, I).
+
+        Where slices of a tilted gantry were moved, a neighbour of a clipped voxel on the way they
+        were moved is a mixture with a clipped one.
+        """
+        clipped = self.voxels >= clip_hu
+        acquired = self.volume.source.acquisition
+        if acquired is None:
+            return clipped
+        i, j, _ = np.abs(self.volume.direction.T @ acquired.ijk_to_lps[:3, 2]) > MOVED_MM
+        return binary_dilation(clipped, np.ones((1, 3 if j else 1, 3 if i else 1), bool))
 
     @cached_property
     def is_mask(self) -> bool:

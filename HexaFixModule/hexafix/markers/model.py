@@ -131,7 +131,7 @@ def _band(
     square = np.einsum("ni,ni->n", points, points)
     take = (square > max(0.0, radius - INSIDE_MM) ** 2) & (square < (radius + OUTSIDE_MM) ** 2)
     if clip_hu is not None:
-        take &= values < clip_hu
+        take &= ~crop.clipped(clip_hu).reshape(-1)
     points, values = points[take], values[take]
     if not all_voxels and len(values) > 1.5 * MOST_VOXELS:
         thin = round(len(values) / MOST_VOXELS)
