@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexafix.accuracy.jacobian import least_squares_covariance
-from hexafix.accuracy.joint_error import ErrorTarget, PlaceError, place_error
+from hexafix.accuracy.joint_error import ErrorTarget, PlaceError, bone_covariance_mm2, place_error
 from hexafix.accuracy.layout_check import UNIQUENESS_TARGET_MM, LayoutVerdict, check_layout
 from hexafix.errors import InputError
 from hexafix.hardware import MarkerLayout, Places
@@ -123,6 +124,8 @@ class AssessedRing:
     verdict : LayoutVerdict
     place_error : PlaceError or None
         None for markers on one line.
+    bone_covariance_mm2 : ndarray, shape (3, 3), or None
+        Of the bone's point, ring frame.
     places : tuple of int or None
         Hole or site of each marker, counted from 1; None for a layout as it is.
     moves : tuple of Move
@@ -132,6 +135,7 @@ class AssessedRing:
     layout: MarkerLayout
     verdict: LayoutVerdict
     place_error: PlaceError | None
+    bone_covariance_mm2: NDArray[np.float64] | None
     places: tuple[int, ...] | None = None
     moves: tuple[Move, ...] = ()
 
@@ -304,7 +308,10 @@ def assess(
         "sigma_installation_mm": rules.sigma_installation_mm,
     }
     verdict = check_layout(layout, **errors)
-    error = None
+    error = bone = None
     if verdict.triangle_height_mm >= MIN_TRIANGLE_HEIGHT_MM:
-        error = place_error(least_squares_covariance(layout, **errors), target)
-    return AssessedRing(layout, verdict, error, places, moves)
+        covariance = least_squares_covariance(layout, **errors)
+        error = place_error(covariance, target)
+        bone = bone_covariance_mm2(covariance, target)
+        bone.setflags(write=False)
+    return AssessedRing(layout, verdict, error, bone, places, moves)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hexafix.geometry import skew
 from hexafix.hardware import Ring, StrutType
 
 Array = NDArray[np.float64]
@@ -121,6 +122,12 @@ def place_error(covariance: ArrayLike, target: ErrorTarget) -> PlaceError:
 
     joints, bone = square(target.joint_moments), square(target.bone_moments)
     return PlaceError(*np.sqrt([(joints + bone) / 2, joints, bone]).tolist())
+
+
+def bone_covariance_mm2(covariance: ArrayLike, target: ErrorTarget) -> Array:
+    """Covariance of the bone's point, shape (3, 3), ring frame, mm²; arguments as `place_error`."""
+    lever = np.hstack([np.eye(3), -skew(np.array([0.0, 0.0, target.bone_height_mm]))])
+    return lever @ np.asarray(covariance, float) @ lever.T
 
 
 def unit_square_errors(

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from hexafix import __version__
+from hexafix.cli.advise import advise
 from hexafix.cli.console import (
     command_line_error,
     print_json,
@@ -37,6 +38,7 @@ app = App(
     version=version_text,
     help_format="plaintext",
 )
+app.command(advise)
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document.")]
 Quiet = Annotated[bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress.")]
@@ -210,11 +212,12 @@ def check_layout(
     json: Json = False,
 ) -> int:
     """Check a marker layout before the CT: angles, uniqueness, predicted error, a better one."""
-    from hexafix.case import load_layouts
+    from hexafix.case import load_layouts, load_rings
     from hexafix.cli.show import layout_text
     from hexafix.pipeline import check_case_layout
 
-    document = check_case_layout(*load_layouts(case_or_layout))
+    layouts = load_layouts(case_or_layout)
+    document = check_case_layout(*layouts, rings=load_rings(case_or_layout))
     print_json(document) if json else print(layout_text(document))
     return 0
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -34,7 +35,7 @@ FARTHEST_BALLS = 2.0
 """Smallest distance of two balls in ball diameters, so that no image joins them."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class HoleOptions:
     """What the command line says about the holes; None: as the file says, or the default.
 
@@ -52,7 +53,12 @@ class HoleOptions:
     radius_mm: float | None = None
     offset_rad: float | None = None
     heights_mm: tuple[float, ...] | None = None
-    occupied: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    occupied: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def in_degrees(cls, *, offset_deg: float | None, **others: Any) -> HoleOptions:
+        """As given at a door."""
+        return cls(offset_rad=None if offset_deg is None else math.radians(offset_deg), **others)
 
 
 def check_case_layout(
@@ -83,7 +89,7 @@ def advise_layouts(
     only: Literal["proximal", "distal"] | None = None,
     top: int = 5,
     relaxed: bool = False,
-    margin_mm: float = UNIQUENESS_TARGET_MM,
+    margin_mm: float | None = None,
 ) -> Advice:
     """The best layouts of the rings' free holes: what ``hexafix advise`` says.
 
@@ -97,7 +103,8 @@ def advise_layouts(
         Advise this ring alone; the other keeps its layout.
     top : int
     relaxed : bool
-    margin_mm : float
+    margin_mm : float, optional
+        Without, `UNIQUENESS_TARGET_MM`.
 
     Raises
     ------
@@ -122,7 +129,7 @@ def advise_layouts(
     ball = rings.ball_diameter_mm
     rules = AdviceRules(
         relaxed=relaxed,
-        margin_mm=margin_mm,
+        margin_mm=UNIQUENESS_TARGET_MM if margin_mm is None else margin_mm,
         spacing_mm=SPACING_MM if ball is None else FARTHEST_BALLS * ball,
     )
     return advise(_numbered(tasks), rules=rules, top=top, other=other)
@@ -179,7 +186,7 @@ def _numbered(tasks: Sequence[RingTask]) -> list[RingTask]:
 def _places(rings: Rings, k: int, options: HoleOptions) -> Places:
     """The holes of a ring as the file says, changed by the options, else the defaults."""
     known, layout = rings.places[k], rings.layouts[k]
-    occupied = dict(options.occupied).get(rings.names[k])
+    occupied = options.occupied.get(rings.names[k])
     given = (options.count, options.radius_mm, options.offset_rad, options.heights_mm, occupied)
     if known is not None and not isinstance(known, HoleCircle):
         if any(value is not None for value in given):

@@ -38,9 +38,12 @@ class Canvas:
     ----------
     width_mm, height_mm : float
         Size of the drawing.
+    font : str
+        Font of all texts; name others behind it where the drawing stands by itself.
     """
 
-    def __init__(self, width_mm: float, height_mm: float) -> None:
+    def __init__(self, width_mm: float, height_mm: float, *, font: str = FONT) -> None:
+        self.font = font
         self.width_mm = float(width_mm)
         self.height_mm = float(height_mm)
         self._parts: list[str] = []
@@ -75,7 +78,9 @@ class Canvas:
 
     def text(self, at: Point, words: str, *, size_mm: float, **style: object) -> None:
         """Text whose baseline starts, or by ``text_anchor`` centres or ends, at a point."""
-        place = f'x="{_n(at[0])}" y="{_n(at[1])}" font-family="{FONT}" font-size="{_n(size_mm)}"'
+        place = (
+            f'x="{_n(at[0])}" y="{_n(at[1])}" font-family="{self.font}" font-size="{_n(size_mm)}"'
+        )
         self._parts.append(f"<text {place}{_attributes(style)}>{escape(words)}</text>")
 
     def label(self, at: Point, words: str, *, size_mm: float, **style: object) -> None:
