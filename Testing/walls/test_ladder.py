@@ -35,13 +35,15 @@ LADDER = {
     "pipeline": 10,
     "benchmark": 11,
     "scenarios": 11,
+    "study": 11,
     "cli": 12,
     "__main__": 13,
 }
 """Each room's level: a room may import rooms of lower levels only."""
 
 SIDEWAYS_OR_DOORS = {"vtk", "vtkmodules", "pyvista", "slicer", "qt", "ctk", "qtpy", "PySide6",
-                     "trame", "trame_slicer", "matplotlib", "skimage"}  # fmt: skip
+                     "trame", "trame_slicer", "matplotlib", "skimage", "joblib",
+                     "distributed"}  # fmt: skip
 """Optional libraries: never imported at a module's top level."""
 
 LIBRARIES = {

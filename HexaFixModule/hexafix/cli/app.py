@@ -19,6 +19,7 @@ from hexafix.cli.console import (
     quiet_libraries,
     report_error,
 )
+from hexafix.cli.study import study
 from hexafix.errors import HexaFixError
 
 NOTICE = "Research software, not a medical device."
@@ -38,6 +39,7 @@ app = App(
     version=version_text,
     help_format="plaintext",
 )
+app.command(study)
 app.command(advise)
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document.")]
