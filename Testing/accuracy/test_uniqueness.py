@@ -2,6 +2,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from hexafix.accuracy import uniqueness
 from hexafix.accuracy.uniqueness import (
     best_exchange,
     best_relabelling,
@@ -87,3 +88,18 @@ def test_many_even_markers_end_with_a_lower_bound_and_not_in_an_endless_search()
         radius_mm=[100.0] * 16, sweep_deg=np.arange(16) * 22.5, height_mm=[20.0] * 16
     )
     assert best_relabelling(layout)[0] < 1e-9
+
+
+def test_a_search_cut_short_states_a_lower_bound(layout_at, monkeypatch):
+    # even but for a few degrees: the likely wrong numberings miss by far more than 10 mm
+    rng = np.random.default_rng(2)
+    layout = layout_at(
+        np.arange(9) * 40.0 + rng.uniform(-12, 12, 9),
+        radius_mm=rng.uniform(70, 130, 9),
+        height_mm=rng.uniform(0, 40, 9),
+    )
+    whole = best_relabelling(layout)[0]
+    assert whole > 10.0
+    for work in (50, 12, 1):
+        monkeypatch.setattr(uniqueness, "WORK", work)
+        assert best_relabelling(layout)[0] in uniqueness.FALLBACK_MM, (work, whole)

@@ -7,6 +7,7 @@ from hexafix.correction import (
     TargetPose,
     compensate,
     motion_between,
+    subtraction_departure_mm,
     target_of,
 )
 from hexafix.errors import InputError
@@ -128,6 +129,40 @@ def test_additive_is_the_papers_subtraction_of_pose_vectors(scene):
     np.testing.assert_allclose(additive.pose_vector_difference, error, atol=1e-12)
     np.testing.assert_allclose(target.position_mm, plain.position_mm - error[:3], atol=1e-9)
     np.testing.assert_allclose(target.angles_rad, plain.angles_rad - error[3:], atol=1e-12)
+
+
+def test_the_departure_of_the_subtraction_is_that_of_the_joints(scene, fixator):
+    _, seen, struts, motion = scene
+    goal = FragmentMotion("proximal", motion)
+    additive = compensate(seen, theoretical=struts, mode="additive")
+    # the planned mechanism with the recognition error taken out on the right, by plain matrices
+    planned = np.linalg.inv(seen.distal.matrix) @ motion.matrix @ seen.proximal.matrix
+    composed = planned @ np.linalg.inv(seen.mechanism.matrix) @ struts.matrix
+    joints = np.c_[fixator.proximal.joints_mm, np.ones(6)].T
+    apart = (composed - target_of(goal, additive).matrix) @ joints
+    expected = np.linalg.norm(apart[:3], axis=0).max()
+    assert expected > 0.01
+    assert subtraction_departure_mm(goal, additive, fixator) == pytest.approx(expected)
+    for other in (goal, TargetPose(struts)):
+        fused = compensate(seen, theoretical=struts)
+        assert subtraction_departure_mm(other, fused, fixator) == 0.0
+    assert subtraction_departure_mm(TargetPose(struts), additive, fixator) == 0.0
+
+
+def test_the_subtraction_departs_less_the_smaller_the_angles(fixator, random_pose):
+    rng = np.random.default_rng(12)
+    departures = []
+    for deg in (0.5, 5.0, 25.0):
+        rings = RecognisedRings(
+            random_pose(rng) @ Pose.exp(SIGMA), Pose.identity(), np.eye(6), np.eye(6)
+        )
+        struts = rings.mechanism @ Pose.exp(-SIGMA)
+        turn = np.radians([deg, -deg, deg])
+        goal = FragmentMotion("proximal", Pose.from_xyz_fixed(position_mm=[0] * 3, angles_rad=turn))
+        additive = compensate(rings, theoretical=struts, mode="additive")
+        departures.append(subtraction_departure_mm(goal, additive, fixator))
+    assert departures == sorted(departures)
+    assert departures[0] < 0.1 < departures[-1]
 
 
 def test_the_pose_vector_difference_does_not_jump_at_half_a_turn():

@@ -8,6 +8,7 @@ from hexafix.correction.compensation import (
     motion_between,
     reading_covariance,
     reading_resolution_mm,
+    subtraction_departure_mm,
     target_of,
 )
 from hexafix.correction.landmarks import LandmarkFit, fit_landmarks
@@ -46,6 +47,7 @@ __all__ = [
     "planned_motion",
     "reading_covariance",
     "reading_resolution_mm",
+    "subtraction_departure_mm",
     "target_of",
     "watched_points",
 ]

@@ -252,6 +252,25 @@ def target_of(goal: TargetPose | FragmentMotion, compensation: Compensation) -> 
     )
 
 
+def subtraction_departure_mm(
+    goal: TargetPose | FragmentMotion, compensation: Compensation, fixator: Fixator
+) -> float:
+    """How far Eq. (32) lies from the same correction by composed transforms (H34), mm.
+
+    The largest distance of a joint of {A} between the target of subtracted pose vectors and the
+    composed one, X_p X_r⁻¹ X_t: the planned motion of the recognised mechanism done from the
+    struts' pose. 0 where nothing is subtracted.
+    """
+    if isinstance(goal, TargetPose) or compensation.mode != "additive":
+        return 0.0
+    planned = mechanism_after(goal, proximal=compensation.proximal, distal=compensation.distal)
+    composed = planned @ compensation.recognised.inverse() @ compensation.start
+    subtracted = target_of(goal, compensation)
+    joints = fixator.proximal.joints_mm
+    apart = composed.apply(joints) - subtracted.apply(joints)
+    return float(np.linalg.norm(apart, axis=1).max())
+
+
 def mechanism_after(motion: FragmentMotion, *, proximal: Pose, distal: Pose) -> Pose:
     """Mechanism pose once a fragment and its ring have moved in the image, {A} in {B}.
 

@@ -7,17 +7,21 @@ computes geometry. The limits stand beside the gates with the reason for each.
 from hexafix.gates.gate import Gate, decide, red
 from hexafix.gates.of_plan import (
     STRUT_LIMIT_MM,
+    STRUT_WARNING_MM,
+    SUBTRACTION_WARNING_MM,
     forward_basin,
     layout_rule,
     realised_rate,
     recognition_error,
     recomputed,
     struts_agree,
+    subtraction_near_composition,
     well_conditioned,
 )
 from hexafix.gates.of_recognition import (
     angles_rebuild,
     ball_diameters,
+    limbs_agree,
     moving_ring_above,
     numbering_unique,
     ring_rms,
@@ -28,12 +32,15 @@ from hexafix.gates.of_recognition import (
 
 __all__ = [
     "STRUT_LIMIT_MM",
+    "STRUT_WARNING_MM",
+    "SUBTRACTION_WARNING_MM",
     "Gate",
     "angles_rebuild",
     "ball_diameters",
     "decide",
     "forward_basin",
     "layout_rule",
+    "limbs_agree",
     "moving_ring_above",
     "numbering_unique",
     "realised_rate",
@@ -44,6 +51,7 @@ __all__ = [
     "rings_face_each_other",
     "sides_agree",
     "struts_agree",
+    "subtraction_near_composition",
     "towards_the_head",
     "well_conditioned",
 ]

@@ -16,6 +16,9 @@ RECOGNITION_LIMIT_MM = 1.5
 RECOGNITION_LIMIT_DEG = 1.0
 """G6: |ΔX_r| beyond which compensation would hide a gross error (H33)."""
 
+SUBTRACTION_WARNING_MM = 0.05
+"""Beyond this the plan tells that subtracted pose vectors differ from composed poses (H34)."""
+
 BASIN_LIMIT_MM = 1e-6
 """G8: second starts of the forward kinematics must agree this well (H30)."""
 
@@ -32,7 +35,8 @@ def struts_agree(differences_mm: ArrayLike, *, better_order: str | None = None) 
     differences_mm : array_like, shape (6,)
         Length by CT minus length by reading, mm.
     better_order : str or None
-        Another order of the readings that fits far better, in words (H25).
+        Another order of the readings that fits far better, in words; then no difference above
+        `STRUT_WARNING_MM` passes (H25).
     """
     differences = np.asarray(differences_mm, float)
     strut = int(np.argmax(np.abs(differences)))
@@ -49,7 +53,7 @@ def struts_agree(differences_mm: ArrayLike, *, better_order: str | None = None) 
         "strut length by CT against its reading",
         "H25" if better_order else "H24",
         worst,
-        STRUT_LIMIT_MM,
+        STRUT_WARNING_MM if better_order else STRUT_LIMIT_MM,
         "mm",
         good=good,
         bad=f"strut {strut + 1} by CT is {differences[strut]:+.2f} mm from its reading{hint}",
@@ -85,6 +89,32 @@ def recognition_error(distance_mm: float, rotation_rad: float) -> tuple[Gate, Ga
             "deg",
             **words,
         ),
+    )
+
+
+def subtraction_near_composition(difference_mm: float) -> Gate:
+    """H34: Eq. (32) against composed transforms; tells and never refuses.
+
+    Parameters
+    ----------
+    difference_mm : float
+        Largest distance of a joint of {A} at the target of Eq. (32) from the composed target.
+    """
+    near = bool(np.isfinite(difference_mm) and difference_mm <= SUBTRACTION_WARNING_MM)
+    return Gate(
+        "H34",
+        "pose-vector-subtraction",
+        "target by subtracted pose vectors against composed poses"
+        + ("" if near else " - BEYOND ITS LIMIT, take the fused compensation"),
+        "H34",
+        float(difference_mm),
+        SUBTRACTION_WARNING_MM,
+        "mm (told)",
+        True,
+        "angles small enough for the paper's subtraction"
+        if near
+        else "the angles are too large for the paper's subtraction of pose vectors",
+        "choose the fused compensation",
     )
 
 

@@ -26,6 +26,19 @@ numbers `number_balls` asks for 5 mm before it returns (H18)."""
 LEG_BONES = frozenset({"tibia", "fibula", "femur", "foot", "ankle", "lower leg", "leg"})
 """Bones whose proximal direction is towards the head in a CT, whatever the table position."""
 
+ARM_BONES = frozenset({"humerus", "radius", "ulna", "forearm", "hand", "wrist", "elbow", "arm"})
+"""Bones of the arm."""
+
+_LEG_PARTS = frozenset(
+    {"LEG", "LOWERLEG", "UPPERLEG", "CALF", "TIBIA", "FIBULA", "TIBIAFIBULA", "TIBFIB", "THIGH"}
+    | {"FEMUR", "KNEE", "ANKLE", "FOOT", "TOE", "CALCANEUS", "HEEL", "LOWEREXTREMITY", "LOWERLIMB"}
+)
+_ARM_PARTS = frozenset(
+    {"ARM", "UPPERARM", "FOREARM", "HUMERUS", "ULNA", "RADIUS", "RADIUSULNA", "ELBOW", "WRIST"}
+    | {"HAND", "FINGER", "THUMB", "SHOULDER", "UPPEREXTREMITY", "UPPERLIMB"}
+)
+"""BodyPartExamined of either limb, without blanks and signs."""
+
 
 def ring_rms(ring: str, rms_mm: float) -> Gate:
     """G2: rigid RMS of a ring's balls against its layout."""
@@ -190,5 +203,30 @@ def sides_agree(side: str, laterality: str | None) -> Gate:
         ("the image does not tell a side" if not told else "both say the same side")
         if passed
         else f"the image's header says {told}",
+        "check that image and case belong together",
+    )
+
+
+def limbs_agree(bone: str, body_part: str | None) -> Gate:
+    """H37: the case's bone against the image's BodyPartExamined, where it names a limb.
+
+    Only an arm for a leg or a leg for an arm is a conflict: many scanners leave the word of a
+    protocol there, which tells nothing.
+    """
+    word = "".join(letter for letter in (body_part or "").upper() if letter.isalpha())
+    told = "leg" if word in _LEG_PARTS else "arm" if word in _ARM_PARTS else ""
+    wanted = "leg" if bone in LEG_BONES else "arm" if bone in ARM_BONES else ""
+    passed = told in ("", wanted) or not wanted
+    good = f"both say {told}" if told and wanted else "the image or the case does not tell a limb"
+    return Gate(
+        "H37",
+        "wrong-limb",
+        f"limb of the bone in the case ({bone}) against the image's header",
+        "H37",
+        0.0 if passed else 1.0,
+        0.0,
+        "conflicts",
+        passed,
+        good if passed else f"the image's header says {told}",
         "check that image and case belong together",
     )

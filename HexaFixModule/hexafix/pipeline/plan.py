@@ -18,6 +18,7 @@ from hexafix.correction import (
     StrutSchedule,
     make_schedule,
     motion_between,
+    subtraction_departure_mm,
     target_of,
     watched_points,
 )
@@ -135,7 +136,8 @@ def plan_recognised(
         raise HexaFixError.of("not-plannable", "a plan needs readings, correction and schedule")
     struts = weigh_struts(case, recognised)
     compensation = struts.compensation
-    target = target_of(planned_motion(case.correction, side=case.limb.side), compensation)
+    goal = planned_motion(case.correction, side=case.limb.side)
+    target = target_of(goal, compensation)
     moving = case.correction.moving
     path = RigidPath(
         start=struts.forward.pose,
@@ -158,6 +160,9 @@ def plan_recognised(
             case.schedule.strut_step_mm,
         ),
     ]
+    if compensation.mode == "additive":
+        departure = subtraction_departure_mm(goal, compensation, case.fixator)
+        found.append(gates.subtraction_near_composition(departure))
     layout = _layout_as_measured(case, recognised)
     found += _layout_gates(layout, accept_relaxed_layout)
     gates.decide(found)

@@ -18,7 +18,7 @@ from hexafix.correction import (
     reading_resolution_mm,
 )
 from hexafix.errors import HexaFixError
-from hexafix.gates import STRUT_LIMIT_MM
+from hexafix.gates import STRUT_WARNING_MM
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
 from hexafix.kinematics import (
@@ -29,6 +29,9 @@ from hexafix.kinematics import (
     strut_lengths,
 )
 from hexafix.pipeline.recognised import Recognised
+
+ORDER_FACTOR = 3.0
+"""Another order of the readings is told when its worst strut fits this many times better (H25)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,17 +68,18 @@ def compare_struts(recognised: Pose, fixator: Fixator, *, lengths_mm: NDArray) -
     by_ct = strut_lengths(recognised, fixator)
     differences = by_ct - lengths_mm
     order = None
-    if np.max(np.abs(differences)) > STRUT_LIMIT_MM:
+    if np.max(np.abs(differences)) > STRUT_WARNING_MM:
         order = _better_order(by_ct, lengths_mm)
     return StrutWitness(differences, order)
 
 
 def _better_order(by_ct: NDArray, lengths: NDArray) -> str | None:
-    """The best of the 720 orders, if it agrees where the given one does not."""
+    """The best of the 720 orders, if it fits far better than the given one."""
     orders = np.array(list(permutations(range(6))))
     worst = np.max(np.abs(by_ct - lengths[orders]), axis=1)
     best = orders[int(np.argmin(worst))]
-    if worst.min() > STRUT_LIMIT_MM:
+    # the first of the orders is the given one
+    if ORDER_FACTOR * worst.min() > worst[0]:
         return None
     given = ", ".join(str(k + 1) for k in best)
     return f"the readings would fit in the order {given}"
