@@ -258,9 +258,9 @@ def test_impossible_bit_depths_are_refused(tmp_path, writer, grid):
 def test_corrupt_compressed_pixels_are_refused(tmp_path, writer, grid):
     items = writer.slices(grid)
     for item in items:
-        # Two segments as they should be, but of runs that give far too many pixels.
+        # Two segments where they should be, but each unpacks to one byte only.
         header = np.array([2, 64, 66, *[0] * 13], "<u4").tobytes()
-        item.PixelData = encapsulate([header + b"\x81\0" * 2])
+        item.PixelData = encapsulate([header + b"\0\1" * 2])
         item["PixelData"].is_undefined_length = True
     folder = writer.save(tmp_path, items, syntax=RLELossless)
     only(faults_of(folder), "corrupt-pixel-data", "H09")

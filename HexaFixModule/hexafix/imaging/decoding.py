@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import closing
@@ -25,6 +26,8 @@ LOSSY_SYNTAXES = frozenset(
     "1.2.840.10008.1.2.4." + tail for tail in ("50", "51", "52", "53", "54", "55", "56", "81")
 )
 
+_UID = re.compile(r"[0-9.]{1,64}")
+
 # The child's limits. Memory: Python and the codecs, the frame in all stages of its decoder, and a
 # deflated file as it is read, inflated and held. Time: for each frame by itself, so that a long
 # series cannot be taken for a hang; a tenth of the slowest codec's speed on a slow machine.
@@ -45,6 +48,9 @@ def require_decoder(transfer_syntax: str) -> list[Fault]:
     if transfer_syntax in PLAIN_SYNTAXES or transfer_syntax == DEFLATED:
         return []
     try:
+        # Checked first: pydicom would quote a name that is none in a warning.
+        if not _UID.fullmatch(transfer_syntax):
+            raise NotImplementedError
         decoder = get_decoder(UID(transfer_syntax))
     except NotImplementedError:
         return [

@@ -48,7 +48,6 @@ _KEYWORDS = (
 _TAGS = [Tag(keyword) for keyword in _KEYWORDS]
 _TAG = dict(zip(_KEYWORDS, _TAGS, strict=True))
 _PIXEL_DATA = 0x7FE00010
-_PIXEL_TAGS = (_PIXEL_DATA, 0x7FE00008, 0x7FE00009)
 _UNDEFINED = 0xFFFFFFFF
 _SIGNED: dict[int | None, bool] = {0: False, 1: True}
 _ITEMS = (b"\xfe\xff\x00\xe0", b"\xff\xfe\xe0\x00")
@@ -70,6 +69,7 @@ class PixelFormat:
     ----------
     transfer_syntax : str
     bits_allocated, bits_stored, high_bit, samples : int
+        0, 0 and -1 for the first three where the header lacks them.
     signed : bool or None
         None when the header does not say.
     photometric : str
@@ -198,13 +198,12 @@ def _parse(path: Path, file: BinaryIO, size: int, syntax: str | None = None) -> 
     if not 1 <= frames <= _MAX_FRAMES:
         raise NotAnImage("DICOM image with an impossible number of frames")
     bits = _integer(dataset, "BitsAllocated") or 0
-    stored = _integer(dataset, "BitsStored") or bits
     high = _integer(dataset, "HighBit")
     pixels = PixelFormat(
         transfer_syntax=syntax,
         bits_allocated=bits,
-        bits_stored=stored,
-        high_bit=stored - 1 if high is None else high,
+        bits_stored=_integer(dataset, "BitsStored") or 0,
+        high_bit=-1 if high is None else high,
         signed=_SIGNED.get(_integer(dataset, "PixelRepresentation")),
         photometric=_text(dataset, "PhotometricInterpretation") or "",
         extended_offsets=_raw(dataset, "ExtendedOffsetTable") is not None,
@@ -228,11 +227,11 @@ def _locate_pixels(file: BinaryIO, dataset: FileDataset) -> tuple[int | None, in
     if len(head) < 8:
         return None, None
     group, element = struct.unpack_from(order + "HH", head)
-    if (group << 16 | element) not in _PIXEL_TAGS:
+    if (group << 16 | element) != _PIXEL_DATA:
         return None, None
     if dataset.original_encoding[0]:
         length, data = struct.unpack_from(order + "L", head, 4)[0], start + 8
-    elif len(head) == 12:
+    elif len(head) == 12 and head[4:6] in (b"OW", b"OB"):
         length, data = struct.unpack_from(order + "L", head, 8)[0], start + 12
     else:
         return None, None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -35,6 +36,8 @@ _INT16 = np.iinfo(np.int16)
 _BASE_MEMORY = 2 << 30
 _LARGEST_VOXEL = 8
 _BASE_SECONDS = 60.0
+# Each slice costs time of its own: a file may not claim millions of them.
+_MAX_SIDE = 20_000
 # As slow as a file of 16 bit voxels on a bad network.
 _VOXELS_PER_SECOND = 5e5
 
@@ -71,12 +74,12 @@ def read_itk_file(path: Path, progress: Progress) -> Volume:
     faults = faults_of_grid(geometry, where)
     if faults:
         raise ImageRefused(*faults)
-    if np.prod(geometry.size_ijk, dtype=float) > MAX_VOXELS:
+    if max(geometry.size_ijk) > _MAX_SIDE or math.prod(geometry.size_ijk) > MAX_VOXELS:
         raise InputError.of(
             "volume-too-large",
             "the image has more voxels than any CT of a limb",
-            value=" x ".join(map(str, geometry.size_ijk)),
-            limit=f"{MAX_VOXELS:.2g} voxels",
+            value=" x ".join(f"{side:.6g}" for side in geometry.size_ijk),
+            limit=f"{MAX_VOXELS:.2g} voxels, {_MAX_SIDE} along each axis",
             where=where,
             next_step="crop the CT around the fixator",
         )
@@ -97,7 +100,7 @@ def read_itk_file(path: Path, progress: Progress) -> Volume:
 def load_isolated(
     path: Path, reader: str, geometry: FileGeometry
 ) -> tuple[dict[str, Any], NDArray]:
-    """What `itk_reader.load_with_itk` returns, read in a child process."""
+    """What `itk_reader.load_with_itk` returns, read in a child process that is proved before."""
     size = int(np.prod(geometry.size_ijk))
     memory = _BASE_MEMORY + 2 * size * _LARGEST_VOXEL
     seconds = _BASE_SECONDS + size / _VOXELS_PER_SECOND

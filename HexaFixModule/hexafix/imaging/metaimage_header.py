@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import zlib
 from pathlib import Path
@@ -19,6 +20,22 @@ from hexafix.imaging.file_geometry import (
 
 _MAX_HEADER = 1 << 16
 _BLOCK = 1 << 20
+_LARGEST_SIDE = 1e9
+_VOXEL_BYTES = {
+    "MET_CHAR": 1, "MET_UCHAR": 1, "MET_SHORT": 2, "MET_USHORT": 2, "MET_INT": 4, "MET_UINT": 4,
+    "MET_LONG": 8, "MET_ULONG": 8, "MET_LONG_LONG": 8, "MET_ULONG_LONG": 8, "MET_FLOAT": 4,
+    "MET_DOUBLE": 8,
+}  # fmt: skip
+# What decides place and values; ITK knows a field only in this very spelling.
+_SPELLINGS = {
+    name.lower(): name
+    for name in (
+        *("NDims", "DimSize", "ElementSpacing", "Offset", "Position", "Origin", "TransformMatrix"),
+        *("Rotation", "Orientation", "DistanceUnits", "CompressedData", "CompressedDataSize"),
+        *("ElementType", "ElementDataFile", "BinaryData", "BinaryDataByteOrderMSB", "HeaderSize"),
+        *("ElementByteOrderMSB", "ElementNumberOfChannels", "ObjectType"),
+    )
+}
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
 
 
@@ -59,9 +76,11 @@ def read_metaimage_header(path: Path) -> FileGeometry:
                 hazard="H08",
             )
         )
+    if not all(1 <= side <= _LARGEST_SIDE and side.is_integer() for side in size):
+        raise _broken("DimSize")
     shape = (int(size[0]), int(size[1]), int(size[2]))
-    if fields.get("compresseddata", "false").lower() == "true":
-        _verify_packed(path, data_file, shape)
+    if fields.get("compresseddata", "false")[:1].lower() in ("t", "1", "y"):
+        _verify_packed(path, data_file, shape, fields.get("elementtype", ""))
     affine = np.eye(4)
     # Each run of three numbers is the direction of one index axis.
     affine[:3, :3] = np.array(axes).reshape(3, 3).T * np.array(spacing) * unit
@@ -69,11 +88,14 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     return FileGeometry(shape, affine, unit)
 
 
-def _verify_packed(path: Path, data_file: str, size_ijk: tuple[int, int, int]) -> None:
-    """Unpack in bounded memory and verify the checksum: ITK takes damaged data as they come."""
+def _verify_packed(
+    path: Path, data_file: str, size_ijk: tuple[int, int, int], voxel_type: str
+) -> None:
+    """Unpack in bounded memory, verify checksum and length: ITK takes data as they come."""
     local = data_file.upper() == "LOCAL"
-    # No voxel type has more than eight bytes, and one component is all that is read.
-    limit = size_ijk[0] * size_ijk[1] * size_ijk[2] * 8
+    if voxel_type not in _VOXEL_BYTES:
+        raise _broken("a type of voxel that HexaFix does not read")
+    expected = math.prod(size_ijk) * _VOXEL_BYTES[voxel_type]
     # 47: the widest window, zlib or gzip by their headers.
     inflater, counted = zlib.decompressobj(47), 0
     with (path if local else path.parent / data_file).open("rb") as file:
@@ -82,15 +104,15 @@ def _verify_packed(path: Path, data_file: str, size_ijk: tuple[int, int, int]) -
             end = re.search(rb"ElementDataFile *= *LOCAL *\r?\n", head, re.IGNORECASE)
             file.seek(end.end() if end else 0)
         try:
-            while not inflater.eof and counted <= limit:
+            while not inflater.eof and counted <= expected:
                 data = inflater.unconsumed_tail or file.read(_BLOCK)
                 if not data:
                     break
                 counted += len(inflater.decompress(data, _BLOCK))
         except zlib.error:
             raise _broken("compressed data are damaged") from None
-    if not inflater.eof:
-        raise _broken("compressed data are damaged")
+    if not inflater.eof or counted != expected:
+        raise _broken("compressed data are damaged or of another length")
 
 
 def _numbers(fields: dict[str, str], names: tuple[str, ...], where: str) -> list[float]:
@@ -113,7 +135,10 @@ def _fields(path: Path) -> dict[str, str]:
         name, found, value = line.partition("=")
         if not found:
             break
-        name = name.strip().lower()
+        name = name.strip()
+        if _SPELLINGS.get(name.lower(), name) != name:
+            raise _broken("a field with capital letters in other places")
+        name = name.lower()
         if name in fields:
             raise _broken("a field given twice")
         fields[name] = value.strip()

@@ -22,6 +22,10 @@ _UNITS_MM = {1: 1000.0, 2: 1.0, 3: 1e-3}
 _LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _WHERE = "NIfTI header"
 _BLOCK = 1 << 20
+# DT_UINT8, INT16, INT32, FLOAT32, FLOAT64, INT8, UINT16, UINT32, INT64, UINT64.
+_VOXEL_BITS = {2: 8, 4: 16, 8: 32, 16: 32, 64: 64, 256: 8, 512: 16, 768: 32, 1024: 64, 1280: 64}
+# Extensions stand between header and voxels; float32 counts bytes exactly up to here.
+_LAST_START = float(1 << 24)
 
 
 def read_nifti_header(path: Path) -> FileGeometry:
@@ -64,6 +68,8 @@ def read_nifti_header(path: Path) -> FileGeometry:
         forms["sform"] = _sform(head, order)
     if not forms:
         raise ImageRefused(refuse_geometry("neither sform nor qform is given", _WHERE))
+    if not all(np.isfinite(form).all() for form in forms.values()):
+        raise ImageRefused(refuse_geometry("sform or qform is not finite", _WHERE))
     affines = {name: _LPS_FROM_RAS @ _scaled(form, unit) for name, form in forms.items()}
     shape = (size[0], size[1], size[2])
     _refuse_disagreement(affines, shape)
@@ -95,9 +101,13 @@ def _refuse_disagreement(
 
 def _refuse_truncation(path: Path, head: bytes, order: str, size_ijk: tuple[int, int, int]) -> None:
     """ITK fills what is missing at the end of a NIfTI file and says nothing."""
-    (bits,) = struct.unpack_from(order + "h", head, 72)
+    datatype, bits = struct.unpack_from(order + "2h", head, 70)
+    if _VOXEL_BITS.get(datatype) != bits:
+        raise _broken("a type of voxel that HexaFix does not read")
     (start,) = struct.unpack_from(order + "f", head, 108)
-    expected = int(max(start, 0.0)) + size_ijk[0] * size_ijk[1] * size_ijk[2] * (bits // 8)
+    if not 0.0 <= start <= _LAST_START:
+        raise _broken("the voxels begin at an impossible place")
+    expected = int(start) + size_ijk[0] * size_ijk[1] * size_ijk[2] * (bits // 8)
     present = _length(path, expected)
     if present < expected:
         raise ImageRefused(

@@ -27,6 +27,7 @@ _SPACES = {
 }
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3}
 _MAX_HEADER = 1 << 20
+_LARGEST_SIDE = 10**9
 _VECTOR = re.compile(r"\(([^()]*)\)")
 
 
@@ -50,6 +51,8 @@ def read_nrrd_header(path: Path) -> FileGeometry:
     except (KeyError, ValueError):
         raise _broken("sizes") from None
     require_three_dimensions(len(size), where)
+    if not all(1 <= side <= _LARGEST_SIDE for side in size):
+        raise _broken("sizes")
     signs = _SPACES.get(fields.get("space", "").strip().lower())
     if signs is None:
         raise ImageRefused(
