@@ -157,7 +157,7 @@ def series(
 ) -> int:
     """List the series of a DICOM folder with their SeriesInstanceUIDs, to choose one."""
     from hexafix.cli.show import series_text
-    from hexafix.pipeline.series import series_document
+    from hexafix.imaging.series_list import series_document
 
     with progress_bar(quiet=quiet) as progress:
         document = series_document(folder, progress=progress)

@@ -1,4 +1,4 @@
-"""The series of a DICOM folder, for the user's choice."""
+"""The series of a DICOM folder as a document, for the user's choice."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 from hexafix.errors import InputError
 from hexafix.imaging.dicom_series import SeriesSummary, require_path, scan, summarise
-from hexafix.pipeline.numbers import rounded
 from hexafix.progress import Progress, silent
 
 
@@ -45,9 +44,9 @@ def _series(summary: SeriesSummary) -> dict[str, Any]:
         "image_type": list(summary.image_type),
         "slices": summary.slices,
         "size_ij": list(summary.size_ij),
-        "spacing_mm": None if spacing is None else rounded(spacing, 6),
+        "spacing_mm": None if spacing is None else [round(value, 6) for value in spacing],
         "orientation": summary.orientation,
-        "tilt_deg": None if tilt is None else rounded(tilt, 4),
+        "tilt_deg": None if tilt is None else round(tilt, 4),
         "usable": summary.excluded is None and not summary.faults,
         "left_out": summary.excluded,
         "refused": [fault.as_json() for fault in summary.faults],
