@@ -1,0 +1,130 @@
+"""Remove one gate at a time from a copy of the checkout and demand that a test notices.
+
+    python Testing/hazards/remove_gate.py [H03 H24.2 ...] [--sample N --seed S]
+
+Names select rows or single gates; without them all gates are removed in turn. Ends with 0 when
+the chosen rows' tests pass as they are and, for each gate removed, at least one of them fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import hazard_table
+from hazard_table import TOP, Gate
+
+COPIED = ("HexaFixModule", "Resources", "Testing", "pyproject.toml", "README.md", "LICENSE")
+SLOW = ("cli", "export", "markers", "pipeline", "report", "selftest", "verify")
+"""Folders whose tests plan whole cases, print or fit many balls."""
+NO_PROOF = ("ImportError", "NameError", "SyntaxError", "ModuleNotFoundError")
+"""A removal that fails with these broke the program instead of taking a gate away."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the removals; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", help="rows or gates, e.g. H03 H24.2")
+    parser.add_argument("--sample", type=int, help="only so many, drawn by the seed")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--quick", action="store_true", help="only gates with quick tests")
+    given = parser.parse_args(arguments)
+    gates = chosen(given.names)
+    if given.quick:
+        gates = [g for g in gates if all(test.split("/")[0] not in SLOW for test in g.tests)]
+    if given.sample is not None:
+        gates = random.Random(given.seed).sample(gates, min(given.sample, len(gates)))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "checkout"
+        copy_checkout(copy)
+        return run(copy, gates)
+
+
+def chosen(names: Sequence[str]) -> list[Gate]:
+    """The gates of the named rows, or the named gates; all without a name."""
+    gates = [gate for row in hazard_table.load()[0] for gate in row.gates]
+    known = {gate.name for gate in gates} | {gate.row for gate in gates}
+    unknown = sorted(set(names) - known)
+    if unknown:
+        raise SystemExit("no such row or gate: " + ", ".join(unknown))
+    return [gate for gate in gates if not names or gate.name in names or gate.row in names]
+
+
+def copy_checkout(copy: Path) -> None:
+    """What the tests need, and the third-party CT where it lies beside the checkout."""
+    copy.mkdir()
+    for name in COPIED:
+        if (TOP / name).is_dir():
+            ignore = shutil.ignore_patterns("__pycache__", ".*")
+            shutil.copytree(TOP / name, copy / name, ignore=ignore)
+        else:
+            shutil.copy2(TOP / name, copy / name)
+    if (TOP.parent / "shared").is_dir():
+        (copy.parent / "shared").symlink_to(TOP.parent / "shared")
+
+
+def run(copy: Path, gates: Sequence[Gate]) -> int:
+    """Prove every gate in the copy."""
+    started = time.monotonic()
+    unremoved = sorted({test for gate in gates for test in gate.tests})
+    code, output = run_tests(copy, unremoved)
+    if code != 0:
+        print(output)
+        print("the tests do not pass as they are: nothing is proved")
+        return 1
+    unproved = []
+    for gate in gates:
+        why = without(copy, gate)
+        print(f"{gate.name:<7} {'UNPROVED: ' + why if why else 'proved'}", flush=True)
+        if why:
+            unproved.append(gate.name)
+    seconds = time.monotonic() - started
+    print(f"{len(gates)} gates removed, {len(gates) - len(unproved)} proved, {seconds:.0f} s")
+    return 1 if unproved else 0
+
+
+def without(copy: Path, gate: Gate) -> str:
+    """Why the gate's removal proves nothing, empty if a test fails without it."""
+    file = copy / gate.removal.file
+    source = file.read_text("utf-8")
+    try:
+        file.write_text(gate.removal.applied(source), "utf-8")
+        code, output = run_tests(copy, gate.tests, first_only=True)
+    finally:
+        file.write_text(source, "utf-8")
+    failed = re.findall(r"^FAILED .*$", output, re.MULTILINE)
+    if code != 1 or not failed:
+        return f"pytest ended with {code} and {len(failed)} failed tests"
+    broken = [word for word in NO_PROOF if any(f"- {word}" in line for line in failed)]
+    return f"the program broke: {failed[0]}" if broken else ""
+
+
+def run_tests(copy: Path, tests: Sequence[str], *, first_only: bool = False) -> tuple[int, str]:
+    """Exit code and output of pytest in the copy."""
+    command = [sys.executable, "-B", "-m", "pytest", "-q", "-rf", "--tb=no"]
+    command += ["-p", "no:cacheprovider", *(["-x"] if first_only else [])]
+    # a removal must never be hidden by a hypothesis example or a package installed elsewhere
+    environment = {k: v for k, v in os.environ.items() if k != "HEXAFIX_CI"}
+    environment |= {"PYTHONPATH": str(copy / "HexaFixModule"), "COLUMNS": "300"}
+    done = subprocess.run(
+        [*command, *(f"Testing/{test}" for test in tests)],
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+if __name__ == "__main__":
+    sys.exit(main())
