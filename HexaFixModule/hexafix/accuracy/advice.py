@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hexafix.accuracy.advised import AdviceRules, RingPlaces, RingTask
 from hexafix.accuracy.advisor import advise
+from hexafix.accuracy.fewest_moves import fewest_moves
 from hexafix.accuracy.jacobian import isotropic_covariances, volume_error
 from hexafix.accuracy.layout_candidates import MARKERS
 from hexafix.accuracy.layout_check import (
@@ -142,15 +143,18 @@ def check_layouts(
 def best_on_places(
     layout: MarkerLayout, known: RingPlaces, *, other: MarkerLayout | None, sigma_mm: float
 ) -> Suggestion | None:
-    """The best layout of a ring's free holes with as many markers; as `better_layout`."""
+    """The best layout that moves one marker to a free place, or two, or as many as it takes."""
     task = RingTask("ring", known.places, len(layout), known.target, layout)
     rules = AdviceRules(sigma_image_mm=sigma_mm, sigma_installation_mm=0.0)
-    try:
-        found = advise([task], rules=rules, top=1, other=other)
-    except LayoutRejected:
-        return None
-    best = found.proposals[0]
-    ring, exchange = best.rings[0], best.exchange_mm
+    ring = None
+    for mirror in (True, False) if len(layout) > MARKERS[0] else (False,):
+        ring = ring or fewest_moves(task, rules, mirror=mirror, other=other)
+    if ring is None:
+        try:
+            ring = advise([task], rules=rules, top=1, other=other).proposals[0].rings[0]
+        except LayoutRejected:
+            return None
+    exchange = None if other is None else exchange_rms_mm(ring.layout, other)
     unique = ring.verdict.uniqueness_mm
     return Suggestion(
         ring.layout,

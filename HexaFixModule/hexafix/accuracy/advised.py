@@ -102,16 +102,20 @@ class Move:
     to_deg: float
     from_height_mm: float
     to_height_mm: float
+    from_radius_mm: float
+    to_radius_mm: float
 
     @property
     def words(self) -> str:
         """The move as part of a sentence."""
-        text = f"marker {self.number}"
+        steps = []
         if abs(self.from_deg - self.to_deg) > 1e-6:
-            text += f" from {self.from_deg:g} to {self.to_deg:g} degrees"
+            steps.append(f"from {self.from_deg:g} to {self.to_deg:g} degrees")
         if abs(self.from_height_mm - self.to_height_mm) > 1e-6:
-            text += f" from height {self.from_height_mm:g} to {self.to_height_mm:g} mm"
-        return text
+            steps.append(f"from height {self.from_height_mm:g} to {self.to_height_mm:g} mm")
+        if abs(self.from_radius_mm - self.to_radius_mm) > 1e-6:
+            steps.append(f"from radius {self.from_radius_mm:g} to {self.to_radius_mm:g} mm")
+        return f"marker {self.number} " + " and ".join(steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +131,8 @@ class AssessedRing:
     bone_covariance_mm2 : ndarray, shape (3, 3), or None
         Of the bone's point, ring frame.
     places : tuple of int or None
-        Hole or site of each marker, counted from 1; None for a layout as it is.
+        Hole or site of each marker, counted from 1, None for one that is on none; None in all for
+        a layout as it is.
     moves : tuple of Move
         What changes against the present layout.
     """
@@ -136,7 +141,7 @@ class AssessedRing:
     verdict: LayoutVerdict
     place_error: PlaceError | None
     bone_covariance_mm2: NDArray[np.float64] | None
-    places: tuple[int, ...] | None = None
+    places: tuple[int | None, ...] | None = None
     moves: tuple[Move, ...] = ()
 
     @property
@@ -202,6 +207,8 @@ class RingReport:
         Whether the proposals can show a mirrored image; three markers never can.
     compared : int
         Layouts compared, turned and reflected copies counted once.
+    fewest : AssessedRing or None
+        Where the present layout breaks a rule: the best that mends it by one move, or by two.
     """
 
     task: RingTask
@@ -209,6 +216,7 @@ class RingReport:
     weaknesses: tuple[Weakness, ...]
     mirror_shown: bool
     compared: int
+    fewest: AssessedRing | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The ring's present layout and what it lacks."""
@@ -217,6 +225,7 @@ class RingReport:
             "weaker_because": [
                 {"term": w.term, "words": w.words, "refused": w.refused} for w in self.weaknesses
             ],
+            "fewest_moves": self.fewest.as_json() if self.fewest else None,
             "mirror_shown": self.mirror_shown,
             "layouts_compared": self.compared,
         }
@@ -299,7 +308,7 @@ def assess(
     target: ErrorTarget,
     rules: AdviceRules,
     *,
-    places: tuple[int, ...] | None = None,
+    places: tuple[int | None, ...] | None = None,
     moves: tuple[Move, ...] = (),
 ) -> AssessedRing:
     """A layout with every figure, by the full check."""

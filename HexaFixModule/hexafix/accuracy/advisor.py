@@ -17,6 +17,7 @@ from hexafix.accuracy.advised import (
     RingTask,
     assess,
 )
+from hexafix.accuracy.fewest_moves import fewest_moves
 from hexafix.accuracy.layout_candidates import Candidates, list_candidates
 from hexafix.accuracy.layout_check import exchange_rms_mm
 from hexafix.accuracy.layout_placing import Placed, placed
@@ -293,12 +294,13 @@ def _answer(
     """The proposals beside what there is, and why that is weaker."""
     exchange = _exchange([ring.layout if ring else None for ring in present], other)
     reports, kept = [], True
+    fewest = _mended(tasks, searches, present, rules, other)
     for k, (task, search, ring) in enumerate(zip(tasks, searches, present, strict=True)):
         best = proposals[0].rings[k]
         shown = search.mirror_shown
         why = weaknesses(ring, best, rules, exchange_mm=exchange, mirror=shown) if ring else ()
         kept &= ring is not None and keeps_rules(ring, rules, exchange_mm=exchange, mirror=shown)
-        reports.append(RingReport(task, ring, why, shown, len(search.candidates)))
+        reports.append(RingReport(task, ring, why, shown, len(search.candidates), fewest[k]))
     whole = [ring.error_mm for ring in present if ring is not None]
     error = float(np.sqrt(np.sum(np.square(whole)))) if len(whole) == len(tasks) else np.inf
     return Advice(
@@ -309,6 +311,28 @@ def _answer(
         exchange,
         kept and error <= proposals[0].error_mm * (1.0 + 1e-9),
     )
+
+
+def _mended(
+    tasks: Sequence[RingTask],
+    searches: Sequence[_Search],
+    present: list[AssessedRing | None],
+    rules: AdviceRules,
+    other: MarkerLayout | None,
+) -> list[AssessedRing | None]:
+    """Each ring that breaks a rule with the fewest moves that mend it, one ring after the other."""
+    mended: list[AssessedRing | None] = []
+    for task, search, ring in zip(tasks, searches, present, strict=True):
+        # The distal ring must differ from the proximal one as it will be built.
+        exchange = _exchange([ring.layout if ring else None], other)
+        shown = search.mirror_shown
+        if ring is None or keeps_rules(ring, rules, exchange_mm=exchange, mirror=shown):
+            mended.append(None)
+        else:
+            mended.append(fewest_moves(task, rules, mirror=shown, other=other))
+        built = mended[-1] or ring
+        other = built.layout if built else other
+    return mended
 
 
 def _nothing(tasks: Sequence[RingTask], rules: AdviceRules) -> LayoutRejected:

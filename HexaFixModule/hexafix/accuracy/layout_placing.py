@@ -98,16 +98,23 @@ def _built(
     )
     moves = ()
     if task.present is not None and len(task.present) == len(layout):
-        gone = np.linalg.norm(task.present.points_mm - layout.points_mm, axis=1) > SAME_PLACE_MM
-        moves = tuple(
-            Move(
-                new.number,
-                float(np.mod(round(np.degrees(old.sweep_rad), 6), 360.0)),
-                float(round(np.degrees(new.sweep_rad), 6)),
-                old.height_mm,
-                new.height_mm,
-            )
-            for old, new, moved in zip(task.present.sites, layout.sites, gone, strict=True)
-            if moved
-        )
+        moves = layout_moves(task.present, layout)
     return Placed(layout, tuple(int(k) + 1 for k in chosen), moves, cost)
+
+
+def layout_moves(present: MarkerLayout, layout: MarkerLayout) -> tuple[Move, ...]:
+    """What changes from one layout to another with the same numbers."""
+    gone = np.linalg.norm(present.points_mm - layout.points_mm, axis=1) > SAME_PLACE_MM
+    return tuple(
+        Move(
+            new.number,
+            float(np.mod(round(np.degrees(old.sweep_rad), 6), 360.0)),
+            float(np.mod(round(np.degrees(new.sweep_rad), 6), 360.0)),
+            old.height_mm,
+            new.height_mm,
+            old.radius_mm,
+            new.radius_mm,
+        )
+        for old, new, moved in zip(present.sites, layout.sites, gone, strict=True)
+        if moved
+    )

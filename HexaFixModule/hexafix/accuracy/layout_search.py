@@ -22,6 +22,9 @@ EXACT_BATCH = 32
 FIRST_SORTED = 4_096
 """Best candidates sorted first; sixteen times as many each time they are used up."""
 
+NEWTON_STEPS, NEWTON_REACH = 2, 1e-6
+"""Steps that make the closed form exact, and the share of the value that one may change."""
+
 RMS_TOLERANCE_MM = 1e-6
 """A layout this little below a margin still keeps it."""
 
@@ -64,23 +67,43 @@ def assignment_rms_mm(
 
     Notes
     -----
-    As `rigid_rms_mm`, without the rotation: the singular values of Σ m rᵀ follow from the
-    eigenvalues of its square in closed form. Near 0 the RMS is right to about 0.01 mm only.
+    As `rigid_rms_mm`, without the rotation: the sum s of the singular values of H = Σ m rᵀ, the
+    smallest with the sign of det H, is the largest root of (s² - e)² = 8 s det H + 4 c, with e the
+    squared norm of H and c that of its cofactors. The eigenvalues of HᵀH in closed form come near,
+    Newton's steps the rest of the way.
     """
     a = one - one.mean(axis=1, keepdims=True)
     b = other - other.mean(axis=1, keepdims=True)
-    spread = np.einsum("bpni,bnj->ijbp", a[:, orders], b)
+    h = np.einsum("bpni,bnj->ijbp", a[:, orders], b)
     total = np.sum(a**2, axis=(1, 2)) + np.sum(b**2, axis=(1, 2))
-    s = spread
-    cofactor = [s[1, (k + 1) % 3] * s[2, (k + 2) % 3] - s[1, (k + 2) % 3] * s[2, (k + 1) % 3]
-                for k in range(3)]  # fmt: skip
-    det = s[0, 0] * cofactor[0] + s[0, 1] * cofactor[1] + s[0, 2] * cofactor[2]
-    largest, middle = _two_singular_values(s)
-    product = largest * middle
-    # The smallest singular value carries the sign of the determinant.
-    smallest = np.divide(det, product, out=np.zeros_like(det), where=product > 1e-9)
-    held = largest + middle + (-smallest if mirrored else smallest)
+    cofactors = np.array(
+        [
+            [
+                h[i - 2, j - 2] * h[i - 1, j - 1] - h[i - 2, j - 1] * h[i - 1, j - 2]
+                for j in range(3)
+            ]
+            for i in range(3)
+        ]
+    )
+    det = np.sum(h[0] * cofactors[0], axis=0) * (-1.0 if mirrored else 1.0)
+    held = _near_root(h, det)
+    square, cofactor_square = np.sum(h**2, axis=(0, 1)), np.sum(cofactors**2, axis=(0, 1))
+    for _ in range(NEWTON_STEPS):
+        rest = held**2 - square
+        value = rest**2 - 8.0 * held * det - 4.0 * cofactor_square
+        slope = 4.0 * held * rest - 8.0 * det
+        step = np.divide(value, slope, out=np.zeros_like(value), where=slope > 0.0)
+        # Where two roots are close a step means nothing: the start is that near already.
+        held = held - np.clip(step, -NEWTON_REACH * held, NEWTON_REACH * held)
     return np.sqrt(np.maximum(total[:, None] - 2.0 * held, 0.0) / one.shape[1])
+
+
+def _near_root(h: Array, det: Array) -> Array:
+    """The signed sum of the singular values of matrices, shape (3, 3, ...), to 7 digits."""
+    largest, middle = _two_singular_values(h)
+    product = largest * middle
+    smallest = np.divide(det, product, out=np.zeros_like(det), where=product > 1e-9)
+    return largest + middle + smallest
 
 
 def _two_singular_values(s: Array) -> tuple[Array, Array]:
@@ -196,6 +219,16 @@ def _kept(points: Array, margin_mm: float, mirror_mm: float | None) -> NDArray[n
     if mirror_mm is not None:
         mirror = _below(points, points, orders, mirrored=True)
         kept &= mirror >= mirror_mm - RMS_TOLERANCE_MM
+    return kept
+
+
+def keep_margins(points: Array, margin_mm: float, mirror_mm: float | None) -> NDArray[np.bool_]:
+    """Whether layouts, shape (B, N, 3) in angular order, keep the margins of `feasible`; (B,)."""
+    kept = _likely_kept(points, margin_mm, mirror_mm)
+    rest = np.flatnonzero(kept)
+    for start in range(0, len(rest), EXACT_BATCH):
+        part = rest[start : start + EXACT_BATCH]
+        kept[part] = _kept(points[part], margin_mm, mirror_mm)
     return kept
 
 

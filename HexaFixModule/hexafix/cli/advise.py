@@ -73,6 +73,10 @@ def advice_text(document: dict[str, Any]) -> str:
         if now is not None:
             lines.append(f"{name}, now: {_figures(now)}")
             lines += [f"  weaker: {weakness['words']}" for weakness in ring["weaker_because"]]
+        if ring["fewest_moves"] is not None:
+            fewest = ring["fewest_moves"]
+            lines.append(f"  mended by the fewest moves: {'; '.join(fewest['moves'])}")
+            lines.append(f"    {_figures(fewest)}")
         if not ring["mirror_shown"]:
             lines.append(
                 f"{name}: no layout of these places and markers can show a mirrored image;"
