@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pydicom.uid import UID
+from pydicom.uid import AllTransferSyntaxes
 
 OTHER = "other"
 """Stands for every word that is not known."""
@@ -32,7 +32,7 @@ _IMAGE_TYPES = frozenset(
 
 def shown_transfer_syntax(uid: str) -> str:
     """A transfer syntax that the standard knows; of any other only that it is private."""
-    return uid if UID(uid).is_transfer_syntax and not UID(uid).is_private else "a private one"
+    return uid if uid in AllTransferSyntaxes else "a private one"
 
 
 def shown_modality(modality: str) -> str:

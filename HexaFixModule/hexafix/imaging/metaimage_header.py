@@ -36,6 +36,7 @@ _SPELLINGS = {
         *("ElementByteOrderMSB", "ElementNumberOfChannels", "ObjectType"),
     )
 }
+_BYTE_ORDERS = ("binarydatabyteordermsb", "elementbyteordermsb")
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
 
 
@@ -79,8 +80,12 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     if not all(1 <= side <= _LARGEST_SIDE and side.is_integer() for side in size):
         raise _broken("DimSize")
     shape = (int(size[0]), int(size[1]), int(size[2]))
+    orders = [fields[key][:1].lower() for key in _BYTE_ORDERS if key in fields]
+    if len(set(orders)) > 1:
+        raise _broken("two byte orders")
     if fields.get("compresseddata", "false")[:1].lower() in ("t", "1", "y"):
-        _verify_packed(path, data_file, shape, fields.get("elementtype", ""))
+        voxel_type, skipped = fields.get("elementtype", ""), fields.get("headersize", "0")
+        _verify_packed(path, data_file, shape, voxel_type, skipped)
     affine = np.eye(4)
     # Each run of three numbers is the direction of one index axis.
     affine[:3, :3] = np.array(axes).reshape(3, 3).T * np.array(spacing) * unit
@@ -89,12 +94,14 @@ def read_metaimage_header(path: Path) -> FileGeometry:
 
 
 def _verify_packed(
-    path: Path, data_file: str, size_ijk: tuple[int, int, int], voxel_type: str
+    path: Path, data_file: str, size_ijk: tuple[int, int, int], voxel_type: str, skipped: str
 ) -> None:
     """Unpack in bounded memory, verify checksum and length: ITK takes data as they come."""
     local = data_file.upper() == "LOCAL"
     if voxel_type not in _VOXEL_BYTES:
         raise _broken("a type of voxel that HexaFix does not read")
+    if skipped != "0":
+        raise _broken("compressed data behind a header of their own")
     expected = math.prod(size_ijk) * _VOXEL_BYTES[voxel_type]
     # 47: the widest window, zlib or gzip by their headers.
     inflater, counted = zlib.decompressobj(47), 0

@@ -24,7 +24,8 @@ _WHERE = "NIfTI header"
 _BLOCK = 1 << 20
 # DT_UINT8, INT16, INT32, FLOAT32, FLOAT64, INT8, UINT16, UINT32, INT64, UINT64.
 _VOXEL_BITS = {2: 8, 4: 16, 8: 32, 16: 32, 64: 64, 256: 8, 512: 16, 768: 32, 1024: 64, 1280: 64}
-# Extensions stand between header and voxels; float32 counts bytes exactly up to here.
+# The voxels follow header and extensions; float32 counts bytes exactly up to here.
+_FIRST_START = 352.0
 _LAST_START = float(1 << 24)
 
 
@@ -105,7 +106,7 @@ def _refuse_truncation(path: Path, head: bytes, order: str, size_ijk: tuple[int,
     if _VOXEL_BITS.get(datatype) != bits:
         raise _broken("a type of voxel that HexaFix does not read")
     (start,) = struct.unpack_from(order + "f", head, 108)
-    if not 0.0 <= start <= _LAST_START:
+    if not (_FIRST_START <= start <= _LAST_START and start.is_integer()):
         raise _broken("the voxels begin at an impossible place")
     expected = int(start) + size_ijk[0] * size_ijk[1] * size_ijk[2] * (bits // 8)
     present = _length(path, expected)
