@@ -155,6 +155,18 @@ def _reading(quick: bool) -> Iterator[Row]:
                f"pydicom {result['pydicom_s']:.2f} s")  # fmt: skip
 
 
+def _layouts(quick: bool) -> Iterator[Row]:
+    from hexafix.benchmark.layouts import advice_time
+
+    for count in (3, 4, 5):
+        result = advice_time(count, rounds=2 if quick else 9)
+        detail = (
+            f"{result['compared']} shapes of {result['layouts']} layouts, one by one "
+            f"{result['one_by_one_s']:.0f} s; both rings {result['pair_s']:.3f} s"
+        )
+        yield _row(f"advise {count} markers on 36 holes", result["ring_s"], 0.2, "s", detail)
+
+
 GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "balls": _balls,
     "search": _search,
@@ -164,5 +176,6 @@ GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "compensation": _compensation,
     "chain": _chain,
     "reading": _reading,
+    "layouts": _layouts,
 }
 """What can be measured, by name."""
