@@ -167,6 +167,14 @@ def _layouts(quick: bool) -> Iterator[Row]:
         yield _row(f"advise {count} markers on 36 holes", result["ring_s"], 0.2, "s", detail)
 
 
+def _selftest(quick: bool) -> Iterator[Row]:
+    from hexafix.benchmark.selftest import self_test_time
+
+    result = self_test_time(rounds=2 if quick else 7)
+    detail = f"{result['checks']} checks pass, again {1000 * result['again_s']:.1f} ms"
+    yield _row("self-test at the start of plan", result["first_s"], 0.25, "s", detail)
+
+
 GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "balls": _balls,
     "search": _search,
@@ -177,5 +185,6 @@ GROUPS: dict[str, Callable[[bool], Iterator[Row]]] = {
     "chain": _chain,
     "reading": _reading,
     "layouts": _layouts,
+    "selftest": _selftest,
 }
 """What can be measured, by name."""
