@@ -18,7 +18,7 @@ NOW, BETTER, OVERLAP = "#d55e00", "#0072b2", "#cc79a7"
 """Vermillion, blue and purple of Okabe and Ito's palette; shape and words say the same."""
 
 FONT = "Roboto, Helvetica, Arial, sans-serif"
-PANEL_MM, ROSE_MM, REACH_MM = (92.0, 116.0), 88.0, 30.0
+PANEL_MM, ROSE_MM, REACH_MM = (92.0, 107.0), 80.0, 30.0
 HEAD_MM, FOOT_MM = 13.0, 21.0
 BALL_MM, HOLE_MM = 3.1, 0.85
 MAGNIFICATIONS = (500, 200, 100, 50, 20, 10, 5, 2, 1)
@@ -95,10 +95,12 @@ def _foot(canvas: Canvas, top: float, times: int) -> None:
     canvas.path([_ellipse(np.array([x + 55, y - 0.9]), np.diag([4.0, 1.6]))], closed=True,
                 fill="none", stroke=INK, stroke_width=0.4)  # fmt: skip
     canvas.text((x + 58.5, y), f"bone error, 1 σ × {times}", size_mm=2.6, **style)
-    words = "Seen from proximal: z towards you, angles counter-clockwise from the front (x)."
-    canvas.text((4, top + 15), words, size_mm=2.6, fill=GREY)
-    canvas.text((4, top + 18.5), "At each ball: hole, height. Research software, not a medical "
-                "device.", size_mm=2.6, fill=GREY)  # fmt: skip
+    lines = (
+        "Seen from proximal: z towards you, angles counter-clockwise from x.",
+        "At each ball: hole, height. Research software, not a medical device.",
+    )
+    for index, words in enumerate(lines):
+        canvas.text((4, top + 15.0 + 3.5 * index), words, size_mm=2.6, fill=GREY)
 
 
 def _weak_words(report: RingReport) -> str:
