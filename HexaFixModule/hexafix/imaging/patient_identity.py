@@ -122,8 +122,11 @@ def read_patient_identity(
 def _raw(file: Path) -> tuple[bytes, ...]:
     """The bytes of the identity in the order of `_TAGS`."""
     try:
-        dataset = dcmread(file, stop_before_pixels=True, specific_tags=list(_TAGS.values()))
-        values = (cast(Any, dataset.get_item(tag)) for tag in _TAGS.values())
+        with warnings.catch_warnings():
+            # pydicom quotes header values in its warnings, and those may name the patient.
+            warnings.simplefilter("ignore")
+            dataset = dcmread(file, stop_before_pixels=True, specific_tags=list(_TAGS.values()))
+            values = [cast(Any, dataset.get_item(tag)) for tag in _TAGS.values()]
         return tuple(_bytes(None if item is None else item.value) for item in values)
     except (OSError, ValueError, TypeError, KeyError, AttributeError, IndexError):
         # The libraries' texts may quote what they could not read.
