@@ -73,7 +73,7 @@ def judge_recognition(
     yield must("every ball under its number", sorted(found) == sorted(centers))
     away = [_distance(found[number], centers[number]) for number in found if number in centers]
     yield Finding("ball centre", max(away, default=np.inf), limits.ball_mm(spec), "mm")
-    expected = limits.pose_limits(spec, strut_step_mm=1.0, in_image=True)
+    expected = limits.pose_limits(spec, compensation="none", in_image=False)
     for ring, covariance in (("proximal", expected.proximal), ("distal", expected.distal)):
         true = truth["rings"][ring]["matrix_lps"]
         pose = document["rings"][ring]["matrix_lps"]
@@ -102,18 +102,17 @@ def judge_plan(
     """
     yield from judge_recognition(document, truth, spec)
     schedule, case = document["schedule"], document["case"]
-    in_image = case["correction"]["kind"] != "target-pose"
-    expected = limits.pose_limits(spec, strut_step_mm=schedule["strut_step_mm"], in_image=in_image)
+    expected = limits.pose_limits(
+        spec,
+        compensation=case["schedule"]["compensation"],
+        in_image=case["correction"]["kind"] != "target-pose",
+    )
     struts = document["mechanism"]["from_struts"]["matrix"]
     true = truth["mechanism"]["matrix"]
     yield from _pose_findings("mechanism by struts", struts, true, expected.readings)
     rows = np.array([row["strut_mm"] for row in schedule["rows"]], float)
     poses = _poses(rows + spec.fixator.strut.scale_offset_mm, spec, np.array(true, float))
-    goal = np.array(truth["target"]["mechanism"]["matrix"], float)
-    yield from _pose_findings("end", poses[-1], goal, expected.end)
-    fracture = _fracture_in_a(truth)
-    missed = _distance(_at(poses[-1], fracture), _at(goal, fracture))
-    yield Finding("fracture at the end", missed, limits.at_point_mm(expected.end, fracture), "mm")
+    yield from _end_findings(poses[-1], expected.end, schedule["strut_step_mm"], truth, spec)
     yield from _strut_findings(rows, schedule, spec)
     yield from _rate_findings(poses, case, truth, spec)
     yield from _calendar_findings(schedule, dates)
@@ -148,6 +147,28 @@ def _pose_findings(name: str, pose: Any, true: Any, covariance: Array) -> Iterat
     origin = limits.at_point_mm(covariance, np.zeros(3))
     yield Finding(name, distance, origin, "mm")
     yield Finding(name, float(np.degrees(angle)), limits.turn_deg(covariance), "deg")
+
+
+def _end_findings(
+    end: Array, covariance: Array, step_mm: float, truth: Mapping[str, Any], spec: PhantomSpec
+) -> Iterator[Finding]:
+    """Where the last row puts the true mechanism, against the reduced fracture."""
+    goal = np.array(truth["target"]["mechanism"]["matrix"], float)
+    distance, angle = Pose.from_matrix(end).difference(Pose.from_matrix(goal))
+    origin = limits.at_point_mm(covariance, np.zeros(3))
+    yield Finding("end", distance, limits.with_step(origin, step_mm), "mm")
+    turn_step = float(np.degrees(step_mm / _arm_mm(spec)))
+    turn = limits.with_step(limits.turn_deg(covariance), turn_step)
+    yield Finding("end", float(np.degrees(angle)), turn, "deg")
+    fracture = _fracture_in_a(truth)
+    missed = _distance(_at(end, fracture), _at(goal, fracture))
+    limit = limits.with_step(limits.at_point_mm(covariance, fracture), step_mm)
+    yield Finding("fracture at the end", missed, limit, "mm")
+
+
+def _arm_mm(spec: PhantomSpec) -> float:
+    """Smallest distance of a moving joint from the ring's axis, mm."""
+    return float(np.linalg.norm(spec.fixator.proximal.joints_mm[:, :2], axis=1).min())
 
 
 def _poses(lengths_mm: Array, spec: PhantomSpec, start: Array) -> Array:
@@ -196,12 +217,11 @@ def _rate_findings(
     turned = np.einsum("nij,nij->n", seen[day:, :3, :3], seen[:-day, :3, :3])
     angle = np.degrees(np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))).max()
     extra = 2.0 * rules["strut_step_mm"]
-    arm = float(np.linalg.norm(spec.fixator.proximal.joints_mm[:, :2], axis=1).min())
     yield Finding("way within a day", float(way), rules["max_rate_mm_per_day"] + extra, "mm")
     yield Finding(
         "turn within a day",
         float(angle),
-        rules["max_rate_deg_per_day"] + float(np.degrees(extra / arm)),
+        rules["max_rate_deg_per_day"] + float(np.degrees(extra / _arm_mm(spec))),
         "deg",
     )
 

@@ -18,7 +18,7 @@ _PROXIMAL: dict[int, _Sites] = {
 """Balls of the proximal ring above its plate: sweep angles in degrees and heights in mm."""
 
 _DISTAL: dict[int, _Sites] = {
-    3: ((28, 121, 340), (20, 20, 20)),
+    3: ((23, 103, 216), (20, 20, 20)),
     4: ((63, 111, 175, 262), (20, 20, 45, 20)),
     5: ((59, 117, 166, 214, 342), (-55, -28, -40, -28, -28)),
     6: ((46, 108, 160, 208, 254, 333), (-40, -40, -28, -28, -55, -28)),
@@ -51,6 +51,14 @@ def even() -> dict[str, MarkerLayout]:
     return {
         "proximal": _layout((0, 120, 240), (20, 20, 20), 100.0, 1),
         "distal": _layout((20, 112, 235), (20, 20, 20), 100.0, _FIRST_DISTAL),
+    }
+
+
+def alike() -> dict[str, MarkerLayout]:
+    """The same three angles on both rings: either could be the other."""
+    return {
+        "proximal": _layout(*_PROXIMAL[3], 100.0, 1),
+        "distal": _layout((28, 121, 340), (20, 20, 20), 100.0, _FIRST_DISTAL),
     }
 
 

@@ -3,7 +3,9 @@
 A ball's centre has a limit in mm that grows with voxels, noise and metal. All poses follow from it
 and from the hardware's own tolerances by propagation to first order: a limit is `SIGMAS` predicted
 standard deviations, with the tolerance of the balls' places on the ring (Section 4.2.1), the ball
-limit taken as three standard deviations of a centre, and readings and rows uniform within a step.
+limit taken as three standard deviations of a centre, and readings uniform within their step. The
+rows' rounding may add one strut step at the end, at the ring, at the fracture, and at the joints
+for the turn.
 """
 
 from __future__ import annotations
@@ -62,7 +64,7 @@ class PoseLimits:
     readings : ndarray
         Of the pose that the readings give.
     end : ndarray
-        Of the pose at the end of the schedule.
+        Of the pose at the end of the schedule, the rows' rounding apart.
     """
 
     proximal: Array
@@ -72,14 +74,15 @@ class PoseLimits:
     end: Array
 
 
-def pose_limits(spec: PhantomSpec, *, strut_step_mm: float, in_image: bool) -> PoseLimits:
+def pose_limits(spec: PhantomSpec, *, compensation: str, in_image: bool) -> PoseLimits:
     """What may be expected of every pose.
 
     Parameters
     ----------
     spec : PhantomSpec
-    strut_step_mm : float
-        Step of the schedule's rows.
+    compensation : str
+        Of the schedule: the additive one replaces the error of recognition by that of the
+        readings, the fused one does at least as well as none.
     in_image : bool
         Whether the correction is given in the image, so that recognition enters the end pose; a
         target pose of the mechanism itself is reached up to the rows' rounding.
@@ -87,10 +90,10 @@ def pose_limits(spec: PhantomSpec, *, strut_step_mm: float, in_image: bool) -> P
     sigma_mm = float(np.hypot(spec.installation_sigma_mm, ball_mm(spec) / 3.0 / np.sqrt(3.0)))
     rings = [ring_covariance(layout, sigma_mm) for layout in (spec.proximal, spec.distal)]
     readings = rounding_covariance(spec.mechanism_pose, spec.fixator, spec.strut_reading_step_mm)
-    end = rounding_covariance(spec.target_pose, spec.fixator, strut_step_mm)
-    if in_image:
-        end = end + between(spec.target_pose, rings[0], rings[1]) + readings
     mechanism = between(spec.mechanism_pose, rings[0], rings[1])
+    end = np.zeros((6, 6))
+    if in_image:
+        end = readings if compensation == "additive" else between(spec.target_pose, *rings)
     return PoseLimits(rings[0], rings[1], mechanism, readings, end)
 
 
@@ -129,3 +132,8 @@ def at_point_mm(covariance: Array, point_mm: Array) -> float:
 def turn_deg(covariance: Array) -> float:
     """Limit of a rotation, degrees."""
     return SIGMAS * float(np.degrees(np.sqrt(np.trace(covariance[3:, 3:]))))
+
+
+def with_step(limit: float, step: float) -> float:
+    """A limit with what whole strut steps may add to it, in the same unit."""
+    return float(np.hypot(limit, step))

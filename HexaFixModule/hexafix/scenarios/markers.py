@@ -73,12 +73,14 @@ SCENARIOS = (
         number=62,
         title="even layout of 120°, settled by the strut readings",
         phantom={"side": "right", "bone": "tibia", **layouts.even()},
+        told={"numbering_settled_by": "strut-readings"},
     ),
     _scenario(
         number=63,
         title="numbers assigned by hand",
         phantom={"side": "left", "bone": "tibia", **layouts.balls(4, 4)},
         case=(changes.numbered_by_hand(),),
+        told={"numbering_settled_by": "user"},
     ),
     _scenario(
         number=64,

@@ -30,7 +30,7 @@ def _voxels(
 
 
 SCENARIOS = (
-    _voxels(35, (0.5, 0.5, 0.8), 0.8, noise_hu=60.0, **layouts.balls(5, 5, radius_mm=82.0)),
+    _voxels(35, (0.5, 0.5, 1.0), 1.0, noise_hu=60.0, **layouts.balls(3, 3, radius_mm=82.0)),
     _voxels(36, (0.8, 0.8, 1.0), 1.0),
     _voxels(37, (1.3, 0.7, 1.0), 1.0),
     _voxels(38, (0.9, 0.9, 1.2), 2.4),

@@ -55,16 +55,16 @@ SCENARIOS = (
     ),
     _scenario(
         number=100,
-        title="balls of 10 mm written as 12 mm",
+        title="balls of 10 mm written as 12 mm, the size of the struts' steel joints",
         phantom={"side": "left", "bone": "tibia"},
         case=(changes.merged(markers={"ball_diameter_mm": 12.0}),),
-        refusal=Refusal({"ring-not-found": "H12"}),
+        refusal=Refusal({"ring-not-found": "H13"}),
     ),
     _scenario(
         number=101,
-        title="balls of 10 mm written as 10.35 mm",
+        title="balls of 10 mm written as 9.68 mm",
         phantom={"side": "right", "bone": "tibia"},
-        case=(changes.merged(markers={"ball_diameter_mm": 10.35}),),
+        case=(changes.merged(markers={"ball_diameter_mm": 9.68}),),
         refusal=Refusal({"ball-diameter": "H23"}),
     ),
     _scenario(
@@ -117,7 +117,7 @@ SCENARIOS = (
         number=108,
         title="a target that no strut can reach",
         phantom={"side": "left", "bone": "tibia", "correction": "target-pose"},
-        case=(changes.merged(correction={"position_mm": [0.0, 0.0, 236.0]}),),
+        case=(changes.merged(correction={"position_mm": [0.0, 0.0, 262.0]}),),
         refusal=Refusal({"strut-out-of-range": "H27"}),
     ),
     _scenario(
@@ -132,6 +132,13 @@ SCENARIOS = (
         title="a direction of the deformity left out",
         phantom={"side": "right", "bone": "tibia", "correction": "deformity"},
         case=(changes.merged(correction={"axial_rotation": None}),),
-        refusal=Refusal({"direction-missing": "H42"}, exit_code=2),
+        refusal=Refusal({"deformity-parameter": "H42"}, exit_code=2),
+    ),
+    _scenario(
+        number=111,
+        title="both rings built alike, and the image mirrored",
+        phantom={"side": "left", "bone": "tibia", **layouts.alike()},
+        volume=(changes.mirrored("i"),),
+        refusal=Refusal({"numbering-not-settled": "H18"}),
     ),
 )

@@ -60,7 +60,7 @@ SCENARIOS = (
             "gantry_tilt_rad": float(np.radians(15.0)),
         },
         folder=(changes.lost_slice,),
-        refusal=Refusal({"missing-slice": "H03"}),
+        refusal=Refusal({"missing-slice": "H03", "gantry-tilt": "H02"}),
     ),
     _scenario(
         number=88,

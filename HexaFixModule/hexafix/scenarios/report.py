@@ -53,9 +53,10 @@ The limits follow from what was scanned, never from results:
   {STREAKED_MM:g} mm more for each 100 HU of streaks.
 - **Poses** of both rings, of the mechanism by image and by struts, and at the schedule's end:
   {SIGMAS:g} standard deviations predicted to first order from the balls' places on the ring
-  (0.4 mm / 6 per axis), the ball limit, readings and rows rounded to their step. The end pose is
-  where an independent forward solution puts the true mechanism after the last row; it is compared
-  with the pose in which the phantom's fracture is reduced, also at the fracture itself.
+  (0.4 mm / 6 per axis), the ball limit and readings rounded to their step; at the end one strut
+  step more for the rows' rounding. The end pose is where an independent forward solution puts the
+  true mechanism after the last row; it is compared with the pose in which the phantom's fracture
+  is reduced, also at the fracture itself.
 - **Every row**: within the struts' stroke and on their scale; within any day the fastest watched
   point of the true mechanism moves at most the rate and two strut steps; the calendar runs on.
 - **The export** holds its files and verifies by another road.

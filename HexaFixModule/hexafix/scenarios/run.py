@@ -184,10 +184,11 @@ def _played(
                 scenario.refusal, error.faults, error.exit_code, left_behind=left
             )
         return tuple(judged), error.faults
+    told = [must(f"{key} is {due}", document.get(key) == due) for key, due in scenario.told.items()]
     if scenario.recognise_only:
-        return tuple(judge_recognition(document, truth, spec)), ()
+        return (*told, *judge_recognition(document, truth, spec)), ()
     planned = judge_plan(document, truth, spec, dates=scenario.dates)
-    return (whole, *planned), ()
+    return (whole, *told, *planned), ()
 
 
 def bring(

@@ -70,6 +70,8 @@ class Scenario:
         Ask for the poses alone, as ``hexafix recognise`` does.
     dates : tuple of str
         ISO dates that the schedule must hold.
+    told : mapping of str to value
+        Keys of the document that must have just this value.
     refusal : Refusal or None
         None: it must be planned.
     """
@@ -86,6 +88,7 @@ class Scenario:
     accept_relaxed_layout: bool = False
     recognise_only: bool = False
     dates: tuple[str, ...] = ()
+    told: Mapping[str, Any] = field(default_factory=dict)
     refusal: Refusal | None = None
 
     @property
