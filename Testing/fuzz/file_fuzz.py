@@ -53,10 +53,12 @@ def _row(values) -> str:
     return ",".join(f"{value:.9g}" for value in values)
 
 
-def _nrrd(number: int, encoding: str, data_file: str | None = None) -> tuple[bytes, bytes]:
+def _nrrd(
+    number: int, encoding: str, data_file: str | None = None, space: str = "RAS"
+) -> tuple[bytes, bytes]:
     axes = _axes(number)
     fields = [
-        "NRRD0005", "type: short", "dimension: 3", "space: right-anterior-superior",
+        "NRRD0005", "type: short", "dimension: 3", f"space: {space}",
         f"sizes: {SIZE[0]} {SIZE[1]} {SIZE[2]}",
         "space directions: " + " ".join(f"({_row(axes[:, n])})" for n in range(3)),
         "kinds: domain domain domain", "endian: little", f"encoding: {encoding}",
@@ -68,7 +70,6 @@ def _nrrd(number: int, encoding: str, data_file: str | None = None) -> tuple[byt
     body = {
         "raw": raw,
         "gzip": gzip.compress(raw, mtime=0),
-        "ascii": " ".join(map(str, _voxels().ravel())).encode(),
     }[encoding]
     return "\n".join(fields).encode() + b"\n\n", body
 
@@ -115,7 +116,7 @@ def file_seeds() -> dict[str, dict[str, bytes]]:
     return {
         "nrrd-raw": {"image.nrrd": b"".join(_nrrd(21, "raw"))},
         "nrrd-gzip": {"image.nrrd": b"".join(_nrrd(22, "gzip"))},
-        "nrrd-ascii": {"image.nrrd": b"".join(_nrrd(23, "ascii"))},
+        "nrrd-space": {"image.nrrd": b"".join(_nrrd(23, "raw", space="left-posterior-superior"))},
         "nhdr": {"image.nhdr": head, "image.raw": body},
         "mha": {"image.mha": b"".join(_meta(25, packed=False))},
         "mha-packed": {"image.mha": b"".join(_meta(26, packed=True))},

@@ -120,7 +120,7 @@ def _spoil_value(content: dict[str, Any], rng: random.Random, did: list[str]) ->
         other, name = rng.choice(places)
         node[key] = copy.deepcopy(other[name])
     else:
-        numbers = [(n, k) for n, k in places if isinstance(n[k], int | float)]
+        numbers = [(n, k) for n, k in places if isinstance(n[k], int | float) and abs(n[k]) < 1e300]
         if numbers:
             node, key = rng.choice(numbers)
             node[key] = rng.choice([

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import closing
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from pydicom import FileDataset, dcmread
 from pydicom.pixels.decoders.base import get_decoder
 from pydicom.pixels.utils import pixel_array
-from pydicom.uid import UID
+from pydicom.uid import UID, AllTransferSyntaxes
 
 from hexafix.errors import Fault, MissingLibrary
 from hexafix.imaging.dicom_header import DEFLATED, PLAIN_SYNTAXES, SliceHeader
@@ -25,8 +24,6 @@ from hexafix.imaging.isolation import run_isolated
 LOSSY_SYNTAXES = frozenset(
     "1.2.840.10008.1.2.4." + tail for tail in ("50", "51", "52", "53", "54", "55", "56", "81")
 )
-
-_UID = re.compile(r"[0-9.]{1,64}")
 
 # The child's limits. Memory: Python and the codecs, the frame in all stages of its decoder, and a
 # deflated file as it is read, inflated and held. Time: for each frame by itself, so that a long
@@ -49,7 +46,7 @@ def require_decoder(transfer_syntax: str) -> list[Fault]:
         return []
     try:
         # Checked first: pydicom would quote a name that is none in a warning.
-        if not _UID.fullmatch(transfer_syntax):
+        if transfer_syntax not in AllTransferSyntaxes:
             raise NotImplementedError
         decoder = get_decoder(UID(transfer_syntax))
     except NotImplementedError:

@@ -49,6 +49,9 @@ _TAGS = [Tag(keyword) for keyword in _KEYWORDS]
 _TAG = dict(zip(_KEYWORDS, _TAGS, strict=True))
 _PIXEL_DATA = 0x7FE00010
 _UNDEFINED = 0xFFFFFFFF
+# None: implicit. With any other, the header is damaged or its writer meant something else.
+_DECIMAL_VRS = frozenset({None, "UN", "DS"})
+_WORD_VRS = frozenset({None, "UN", "US", "SS"})
 _SIGNED: dict[int | None, bool] = {0: False, 1: True}
 _ITEMS = (b"\xfe\xff\x00\xe0", b"\xff\xfe\xe0\x00")
 _MAX_ITEMS = 400_000
@@ -251,7 +254,10 @@ def _text(dataset: Dataset, keyword: str) -> str | None:
     Read from the raw bytes: code strings, decimals and UIDs are ASCII, and pydicom's conversion of
     each would cost more than the whole rest of the header.
     """
-    value = _raw(dataset, keyword)
+    return _as_text(_raw(dataset, keyword))
+
+
+def _as_text(value: Any) -> str | None:
     if value is None:
         return None
     if isinstance(value, bytes):
@@ -265,7 +271,10 @@ def _text(dataset: Dataset, keyword: str) -> str | None:
 
 def _numbers(dataset: Dataset, keyword: str, count: int) -> tuple[float, ...] | None:
     """`count` plausible decimals, None where the attribute is absent, incomplete or no number."""
-    text = _text(dataset, keyword)
+    element = cast(Any, dataset.get_item(_TAG[keyword]))
+    if element is None or element.VR not in _DECIMAL_VRS:
+        return None
+    text = _as_text(element.value)
     if text is None or "_" in text:  # Python would read 1_0 as ten
         return None
     try:
@@ -285,7 +294,7 @@ def _number(dataset: Dataset, keyword: str) -> float | None:
 def _integer(dataset: Dataset, keyword: str) -> int | None:
     """A US or SS attribute as its unsigned bit pattern."""
     element = cast(Any, dataset.get_item(_TAG[keyword]))
-    if element is None:
+    if element is None or element.VR not in _WORD_VRS:
         return None
     if isinstance(element.value, bytes):
         if len(element.value) != 2:

@@ -80,12 +80,13 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     if not all(1 <= side <= _LARGEST_SIDE and side.is_integer() for side in size):
         raise _broken("DimSize")
     shape = (int(size[0]), int(size[1]), int(size[2]))
+    if fields.get("binarydata", "false")[:1].lower() not in ("t", "1", "y"):
+        raise _broken("voxels written as text")
     orders = [fields[key][:1].lower() for key in _BYTE_ORDERS if key in fields]
     if len(set(orders)) > 1:
         raise _broken("two byte orders")
     if fields.get("compresseddata", "false")[:1].lower() in ("t", "1", "y"):
-        voxel_type, skipped = fields.get("elementtype", ""), fields.get("headersize", "0")
-        _verify_packed(path, data_file, shape, voxel_type, skipped)
+        _verify_packed(path, data_file, shape, fields)
     affine = np.eye(4)
     # Each run of three numbers is the direction of one index axis.
     affine[:3, :3] = np.array(axes).reshape(3, 3).T * np.array(spacing) * unit
@@ -94,17 +95,18 @@ def read_metaimage_header(path: Path) -> FileGeometry:
 
 
 def _verify_packed(
-    path: Path, data_file: str, size_ijk: tuple[int, int, int], voxel_type: str, skipped: str
+    path: Path, data_file: str, size_ijk: tuple[int, int, int], fields: dict[str, str]
 ) -> None:
     """Unpack in bounded memory, verify checksum and length: ITK takes data as they come."""
     local = data_file.upper() == "LOCAL"
+    voxel_type = fields.get("elementtype", "")
     if voxel_type not in _VOXEL_BYTES:
         raise _broken("a type of voxel that HexaFix does not read")
-    if skipped != "0":
+    if fields.get("headersize", "0") != "0":
         raise _broken("compressed data behind a header of their own")
     expected = math.prod(size_ijk) * _VOXEL_BYTES[voxel_type]
     # 47: the widest window, zlib or gzip by their headers.
-    inflater, counted = zlib.decompressobj(47), 0
+    inflater, counted, taken = zlib.decompressobj(47), 0, 0
     with (path if local else path.parent / data_file).open("rb") as file:
         if local:
             head = file.read(_MAX_HEADER)
@@ -112,13 +114,19 @@ def _verify_packed(
             file.seek(end.end() if end else 0)
         try:
             while not inflater.eof and counted <= expected:
-                data = inflater.unconsumed_tail or file.read(_BLOCK)
+                data = inflater.unconsumed_tail
+                if not data:
+                    data = file.read(_BLOCK)
+                    taken += len(data)
                 if not data:
                     break
                 counted += len(inflater.decompress(data, _BLOCK))
         except zlib.error:
             raise _broken("compressed data are damaged") from None
-    if not inflater.eof or counted != expected:
+    taken -= len(inflater.unused_data)
+    # ITK takes as many bytes as CompressedDataSize says, and without it any.
+    said = fields.get("compresseddatasize", "")
+    if not inflater.eof or counted != expected or said != str(taken):
         raise _broken("compressed data are damaged or of another length")
 
 

@@ -28,6 +28,7 @@ _SPACES = {
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3}
 _MAX_HEADER = 1 << 20
 _LARGEST_SIDE = 10**9
+_ENCODINGS = ("raw", "gzip", "gz")
 _VECTOR = re.compile(r"\(([^()]*)\)")
 
 
@@ -46,6 +47,9 @@ def read_nrrd_header(path: Path) -> FileGeometry:
     data_file = fields.get("data file", fields.get("datafile"))
     if data_file is not None and _leaves_folder(path, data_file):
         raise ImageRefused(detached_fault(where))
+    if fields.get("encoding", "").strip().lower() not in _ENCODINGS:
+        # Text is read so loosely that damage to it becomes other numbers.
+        raise _broken("encoding")
     try:
         size = tuple(int(n) for n in fields["sizes"].split())
     except (KeyError, ValueError):
