@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import datetime
 import getpass
+import glob
 import hashlib
 import json
 import os
@@ -118,7 +119,9 @@ def manifest(files: Mapping[str, bytes]) -> bytes:
 def _only_writer(folder: Path) -> Iterator[None]:
     """Hold the target's lock file; the system frees it when the process ends, however it ends."""
     lock = folder.parent / f".{folder.name}.lock"
-    descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+    # A link in the lock's place would let somebody else's file be overwritten.
+    no_link = getattr(os, "O_NOFOLLOW", 0)
+    descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | no_link, 0o644)
     try:
         _take_lock(descriptor, lock)
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
@@ -185,10 +188,11 @@ def _umask() -> int:
 
 def _clear_leftovers(folder: Path) -> None:
     """Remove what a killed writer left beside the target; called by the only writer."""
-    aside = sorted(folder.parent.glob(f".{folder.name}.old-*"))
+    name = glob.escape(folder.name)
+    aside = sorted(folder.parent.glob(f".{name}.old-*"))
     if aside and not folder.exists():
         aside.pop().rename(folder)
-    for leftover in [*aside, *folder.parent.glob(f".{folder.name}.staging-*")]:
+    for leftover in [*aside, *folder.parent.glob(f".{name}.staging-*")]:
         shutil.rmtree(leftover, ignore_errors=True)
 
 

@@ -1,9 +1,9 @@
 """The export folder appears complete or not at all."""
 
+import errno
 import hashlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import textwrap
@@ -108,32 +108,6 @@ def test_a_second_writer_is_refused_by_name_and_time(tmp_path):
     export.write_export(FILES, tmp_path / "out")
 
 
-LOOP = """
-    import sys
-    from pathlib import Path
-    from hexafix import export
-    files = [{n: (n + tag * 20000).encode() for n in export.FILES} for tag in "ab"]
-    print("go", flush=True)
-    for turn in range(10**9):
-        export.write_export(files[turn % 2], Path(sys.argv[1]))
-"""
-
-
-def test_kill_at_any_moment_leaves_the_old_or_the_new_export_complete(tmp_path):
-    expected = [{n: (n + tag * 20000).encode() for n in export.FILES} for tag in "ab"]
-    target = tmp_path / "out"
-    export.write_export(expected[0], target)
-    for turn in range(12):
-        with run_child(LOOP, target) as child:
-            child.stdout.readline()
-            with pytest.raises(subprocess.TimeoutExpired):
-                child.wait(0.02 + 0.013 * turn)
-            child.send_signal(signal.SIGKILL)
-        assert content(target) in expected
-        hashes = json.loads((target / export.MANIFEST).read_text())["sha256"]
-        assert hashes == {n: hashlib.sha256(c).hexdigest() for n, c in content(target).items()}
-
-
 def test_what_a_killed_writer_left_is_cleared_or_restored(tmp_path):
     (tmp_path / ".out.staging-x").mkdir()
     export.write_export(FILES, tmp_path / "out")
@@ -141,3 +115,76 @@ def test_what_a_killed_writer_left_is_cleared_or_restored(tmp_path):
     (tmp_path / "out").rename(tmp_path / ".out.old-1")
     export._clear_leftovers(tmp_path / "out")
     assert content(tmp_path / "out") == FILES
+
+
+def test_a_folder_named_with_brackets_is_cleared_and_restored_too(tmp_path):
+    target = tmp_path / "case [1]*"
+    export.write_export(FILES, target)
+    target.rename(tmp_path / ".case [1]*.old-1")
+    (tmp_path / ".case [1]*.staging-x").mkdir()
+    export._clear_leftovers(target)
+    assert content(target) == FILES
+    assert leftovers(target) == []
+
+
+@pytest.mark.skipif(not hasattr(os, "O_NOFOLLOW"), reason="the system cannot refuse links")
+def test_a_link_in_the_locks_place_is_not_followed(tmp_path):
+    mine = tmp_path / "thesis.txt"
+    mine.write_text("mine")
+    (tmp_path / ".out.lock").symlink_to(mine)
+    with pytest.raises(InputError, match="could not be written"):
+        export.write_export(FILES, tmp_path / "out")
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("older", [True, False], ids=["over an older one", "for the first time"])
+@pytest.mark.parametrize("full_at", range(5))
+def test_a_disk_full_in_the_middle_of_any_file_changes_nothing(
+    tmp_path, monkeypatch, full_at, older
+):
+    if older:
+        export.write_export(FILES, tmp_path / "out")
+    written = []
+    whole = export._write_synced
+
+    def half(path, data):
+        written.append(path)
+        if len(written) <= full_at:
+            return whole(path, data)
+        path.write_bytes(data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(export, "_write_synced", half)
+    with pytest.raises(InputError, match="No space left") as refusal:
+        export.write_export(OTHER, tmp_path / "out")
+    assert refusal.value.faults[0].hazard == "H46"
+    assert len(written) == full_at + 1
+    if older:
+        assert content(tmp_path / "out") == FILES
+    assert (tmp_path / "out").exists() == older
+    monkeypatch.undo()
+    export.write_export(OTHER, tmp_path / "out")
+    assert content(tmp_path / "out") == OTHER
+    assert leftovers(tmp_path / "out") == []
+
+
+@pytest.mark.parametrize("call", ["mkdtemp", "open"])
+def test_a_read_only_place_is_named_as_such(tmp_path, monkeypatch, call):
+    def refuse(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(export.tempfile if call == "mkdtemp" else export.os, call, refuse)
+    with pytest.raises(InputError, match="Read-only file system") as refusal:
+        export.write_export(FILES, tmp_path / "out")
+    assert refusal.value.faults[0].hazard == "H46"
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_lock_of_a_dead_process_does_not_block(tmp_path):
+    with run_child(HOLDER, tmp_path / "out") as child:
+        child.stdout.readline()
+        child.kill()
+    assert (tmp_path / ".out.lock").read_text().count("process") == 1
+    export.write_export(FILES, tmp_path / "out")
+    assert content(tmp_path / "out") == FILES
+    assert leftovers(tmp_path / "out") == []
