@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pydicom
 import pytest
 import SimpleITK as sitk  # noqa: N813
 from hexafix.errors import HexaFixError, ImageRefused
@@ -10,6 +11,7 @@ from hexafix.imaging import read_volume
 from hexafix.imaging.dicom_header import read_headers
 from hexafix.imaging.pixel_data import read_slices
 from hexafix.imaging.slice_stack import arrange
+from scipy.ndimage import map_coordinates
 
 pytestmark = pytest.mark.usefixtures("itk_in_process")
 
@@ -94,6 +96,39 @@ def test_the_tilt_is_found_from_positions_whatever_the_tag_says(name, tilt, ct_c
     stack, _ = arrange(slices)
     assert stack is not None
     assert stack.tilt_deg == pytest.approx(tilt, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dcm_qa_ct/Philips_tilt_m18.5",
+        "dcm_qa_ct/Philips_tilt_p16.5",
+        "dicom2nifti_failing/gantrytilting/001",
+    ],
+)
+def test_a_real_tilted_voxel_has_the_value_of_its_own_slice_at_its_place(name, ct_corpus):
+    volume = read_volume(ct_corpus / name)
+    for path in (ct_corpus / name).iterdir():
+        item = pydicom.dcmread(path)
+        hu = item.pixel_array * float(item.RescaleSlope) + float(item.RescaleIntercept)
+        row, column = np.reshape(np.array(item.ImageOrientationPatient, float), (2, 3))
+        between_rows, between_columns = (float(value) for value in item.PixelSpacing)
+        origin = np.array(item.ImagePositionPatient, float)
+        k = round(float(volume.ijk_from_lps(origin)[2]))
+        i, j, _ = volume.size_ijk
+        index = np.stack(np.meshgrid(np.arange(i), np.arange(j)), -1).reshape(-1, 2)
+        away = volume.lps_from_ijk(np.c_[index, np.full(len(index), k)]) - origin
+        assert np.abs(away @ np.cross(row, column)).max() < 1e-3
+        at = np.stack([away @ column / between_rows, away @ row / between_columns])
+        got = volume.voxels[k].reshape(-1)
+        beyond = np.maximum(-at, at - (np.array([[item.Rows], [item.Columns]]) - 1)).max(axis=0)
+        assert np.all(got[beyond > 1e-3] == -1024)
+        # Near the rim the two splines go on differently.
+        deep = at[:, beyond < -15.0]
+        around = np.stack([hu[tuple(edge(deep).astype(int))] for edge in (np.floor, np.ceil)])
+        spline = map_coordinates(hu, deep, order=3, mode="mirror")
+        expected = np.clip(spline, around.min(axis=0), around.max(axis=0))
+        np.testing.assert_allclose(got[beyond < -15.0], expected, atol=0.55)
 
 
 def test_no_corpus_file_ends_in_anything_but_a_volume_or_a_refusal(ct_corpus):
