@@ -72,7 +72,7 @@ LIBRARIES = {
     "cli": {"cyclopts", "rich"},
     "study": {"numpy", "matplotlib", "joblib", "distributed"},
     "scenarios": {"numpy", "pydicom"},
-    "benchmark": {"numpy", "scipy", "SimpleITK", "skimage", "vtkmodules", "psutil"},
+    "benchmark": {"numpy", "scipy", "pydicom", "SimpleITK", "skimage", "vtkmodules", "psutil"},
 }
 """What each room may use besides the standard library, anywhere in its files."""
 
