@@ -9,6 +9,7 @@ the chosen rows' tests pass as they are and, for each gate removed, at least one
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
 import re
@@ -24,7 +25,7 @@ import hazard_table
 from hazard_table import TOP, Gate
 
 COPIED = ("HexaFixModule", "Resources", "Testing", "pyproject.toml", "README.md", "LICENSE")
-SLOW = ("cli", "export", "markers", "pipeline", "report", "selftest", "verify")
+SLOW = ("cli", "export", "markers", "pipeline", "privacy", "report", "selftest", "verify")
 """Folders whose tests plan whole cases, print or fit many balls."""
 NO_PROOF = ("ImportError", "NameError", "SyntaxError", "ModuleNotFoundError")
 """A removal that fails with these broke the program instead of taking a gate away."""
@@ -72,33 +73,85 @@ def copy_checkout(copy: Path) -> None:
         (copy.parent / "shared").symlink_to(TOP.parent / "shared")
 
 
+class Tests:
+    """Pytest in a copy of the checkout, in forks of one process where the system can fork."""
+
+    def __init__(self, copy: Path) -> None:
+        self.copy = copy
+        # hash-checked byte code: a source changed and put back within a second is noticed
+        compiling = [sys.executable, "-m", "compileall", "-q", "--invalidation-mode"]
+        compiling += ["checked-hash", str(copy / "HexaFixModule")]
+        subprocess.run(compiling, check=True)
+        own = {"PYTHONPATH": str(copy / "HexaFixModule"), "COLUMNS": "300"}
+        own |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        self.environment = {k: v for k, v in os.environ.items() if k != "HEXAFIX_CI"} | own
+        self.server = self._start() if hasattr(os, "fork") else None
+
+    def _start(self) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-B", str(Path(__file__).with_name("remove_server.py"))],
+            cwd=self.copy,
+            env=self.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def __enter__(self) -> Tests:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.server is not None:
+            with self.server:
+                self.server.kill()
+
+    def run(self, tests: Sequence[str], *, first_only: bool = False) -> tuple[int, str]:
+        """Exit code and output of pytest on these tests."""
+        arguments = ["-q", "-rf", "--tb=no", "-p", "no:cacheprovider"]
+        arguments += [*(["-x"] if first_only else []), *(f"Testing/{test}" for test in tests)]
+        if self.server is not None and self.server.stdin and self.server.stdout:
+            print(json.dumps(arguments), file=self.server.stdin, flush=True)
+            answer = json.loads(self.server.stdout.readline())
+            return answer["code"], answer["output"]
+        done = subprocess.run(
+            [sys.executable, "-B", "-m", "pytest", *arguments],
+            cwd=self.copy,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done.returncode, done.stdout + done.stderr
+
+
 def run(copy: Path, gates: Sequence[Gate]) -> int:
     """Prove every gate in the copy."""
     started = time.monotonic()
     unremoved = sorted({test for gate in gates for test in gate.tests})
-    code, output = run_tests(copy, unremoved)
-    if code != 0:
-        print(output)
-        print("the tests do not pass as they are: nothing is proved")
-        return 1
     unproved = []
-    for gate in gates:
-        why = without(copy, gate)
-        print(f"{gate.name:<7} {'UNPROVED: ' + why if why else 'proved'}", flush=True)
-        if why:
-            unproved.append(gate.name)
+    with Tests(copy) as tests:
+        code, output = tests.run(unremoved)
+        if code != 0:
+            print(output)
+            print("the tests do not pass as they are: nothing is proved")
+            return 1
+        for gate in gates:
+            why = without(tests, gate)
+            print(f"{gate.name:<7} {'UNPROVED: ' + why if why else 'proved'}", flush=True)
+            if why:
+                unproved.append(gate.name)
     seconds = time.monotonic() - started
     print(f"{len(gates)} gates removed, {len(gates) - len(unproved)} proved, {seconds:.0f} s")
     return 1 if unproved else 0
 
 
-def without(copy: Path, gate: Gate) -> str:
+def without(tests: Tests, gate: Gate) -> str:
     """Why the gate's removal proves nothing, empty if a test fails without it."""
-    file = copy / gate.removal.file
+    file = tests.copy / gate.removal.file
     source = file.read_text("utf-8")
     try:
         file.write_text(gate.removal.applied(source), "utf-8")
-        code, output = run_tests(copy, gate.tests, first_only=True)
+        code, output = tests.run(gate.tests, first_only=True)
     finally:
         file.write_text(source, "utf-8")
     failed = re.findall(r"^FAILED .*$", output, re.MULTILINE)
@@ -106,24 +159,6 @@ def without(copy: Path, gate: Gate) -> str:
         return f"pytest ended with {code} and {len(failed)} failed tests"
     broken = [word for word in NO_PROOF if any(f"- {word}" in line for line in failed)]
     return f"the program broke: {failed[0]}" if broken else ""
-
-
-def run_tests(copy: Path, tests: Sequence[str], *, first_only: bool = False) -> tuple[int, str]:
-    """Exit code and output of pytest in the copy."""
-    command = [sys.executable, "-B", "-m", "pytest", "-q", "-rf", "--tb=no"]
-    command += ["-p", "no:cacheprovider", *(["-x"] if first_only else [])]
-    # a removal must never be hidden by a hypothesis example or a package installed elsewhere
-    environment = {k: v for k, v in os.environ.items() if k != "HEXAFIX_CI"}
-    environment |= {"PYTHONPATH": str(copy / "HexaFixModule"), "COLUMNS": "300"}
-    done = subprocess.run(
-        [*command, *(f"Testing/{test}" for test in tests)],
-        cwd=copy,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.returncode, done.stdout + done.stderr
 
 
 if __name__ == "__main__":

@@ -136,5 +136,6 @@ def test_a_gate_whose_removal_nobody_misses_is_told(remove_gate, hazard_table, t
         gate.row, gate.number, gate.codes, gate.by, gate.limit, gate.tests, idle
     )
     remove_gate.copy_checkout(tmp_path / "copy")
-    assert "0 failed" in remove_gate.without(tmp_path / "copy", blind)
-    assert remove_gate.without(tmp_path / "copy", gate) == ""
+    with remove_gate.Tests(tmp_path / "copy") as tests:
+        assert "0 failed" in remove_gate.without(tests, blind)
+        assert remove_gate.without(tests, gate) == ""

@@ -1,4 +1,4 @@
-"""What a decoder returns has the size that the header says."""
+"""Decoded pixels have the size that the header says and values that can be Hounsfield units."""
 
 import numpy as np
 import pytest
@@ -23,3 +23,11 @@ def test_a_frame_decoded_to_another_size_is_refused(tmp_path, writer, grid, monk
     with pytest.raises(ImageRefused) as caught:
         read_volume(folder)
     assert {(f.code, f.hazard) for f in caught.value.faults} == {("corrupt-pixel-data", "H09")}
+
+
+def test_values_beyond_any_hounsfield_unit_are_refused(tmp_path, writer, grid):
+    items = writer.slices(grid)
+    items[3].RescaleSlope = "900"
+    with pytest.raises(ImageRefused) as caught:
+        read_volume(writer.save(tmp_path, items))
+    assert {(f.code, f.hazard) for f in caught.value.faults} == {("impossible-values", "H10")}
