@@ -13,6 +13,7 @@ from hexafix.accuracy.layout_search import (
     assignment_rms_mm,
     every_order,
     feasible,
+    keep_margins,
     orders_around,
 )
 from hexafix.errors import InputError, LayoutRejected
@@ -307,6 +308,32 @@ def test_the_ranking_error_is_the_displacement_of_the_joints_and_the_bone():
 def test_markers_on_one_line_have_an_infinite_error():
     x, y, z = np.array([[-100.0, 0.0, 90.0]]), np.zeros((1, 3)), np.full((1, 3), 20.0)
     assert np.isinf(unit_square_errors(x, y, z, TARGET, every_pair=True)).all()
+
+
+def test_every_numbering_counts_and_not_only_the_likely_ones():
+    # Three even balls and one on the axis above them: turning the three fits, which keeps no
+    # order around the ring and exchanges no two balls.
+    points = MarkerLayout.of(
+        radius_mm=[100, 5, 100, 100], sweep_deg=[0, 60, 120, 240], height_mm=[20, 90, 20, 20]
+    ).points_mm[None]
+    unique = smallest_rms(points[0], points[0], every_order(4)[1:])
+    assert unique < 7.0
+    assert smallest_rms(points[0], points[0], orders_around(4)[1:]) > 8.0
+    assert not keep_margins(points, 8.0, None).any()
+    assert keep_margins(points, unique - 0.01, None).all()
+
+
+def test_no_two_balls_are_nearer_than_the_spacing():
+    circle = HoleCircle(36, 100.0)
+    found = {}
+    for spacing in (0.0, 20.0, 60.0):
+        points = list_candidates(circle, 4, TARGET, spacing_mm=spacing)
+        points = points.points_mm(np.arange(len(points)))[..., :2]
+        gaps = np.linalg.norm(points[:, :, None] - points[:, None], axis=-1)
+        found[spacing] = gaps[:, ~np.eye(4, dtype=bool)].min()
+    assert found[0.0] == pytest.approx(200 * np.sin(np.radians(5)))
+    assert found[20.0] == pytest.approx(200 * np.sin(np.radians(10)))
+    assert found[60.0] == pytest.approx(200 * np.sin(np.radians(20)))
 
 
 # --- what is asked for and what cannot be had ---
