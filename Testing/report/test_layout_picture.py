@@ -1,11 +1,15 @@
 """The advisor's picture: both layouts, holes, sectors; the same bytes every time."""
 
+import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
 from hexafix.accuracy import ErrorTarget, RingTask, advise
+from hexafix.case import load_rings
 from hexafix.hardware import HoleCircle, MarkerLayout, MarkerSite, SiteList
+from hexafix.paths import resources
+from hexafix.pipeline.layout import advise_layouts
 from hexafix.report.layout_picture import BETTER, NOW, OVERLAP, REACH_MM, layout_picture
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -93,3 +97,19 @@ def test_the_same_advice_is_the_same_picture():
     one, two = (layout_picture(advise([ring([0.0, 20.0, 150.0])], top=1)) for _ in range(2))
     assert one == two
     assert "nan" not in one
+
+
+DOCUMENTS = resources() / "Documents"
+COMMAND = re.compile(r"^hexafix (advise Resources/\S+) --top \d+ --picture (Resources/\S+)$", re.M)
+
+
+def test_the_documented_pictures_are_what_their_commands_draw():
+    page = (DOCUMENTS / "layout-advisor.md").read_text(encoding="utf-8")
+    commands = COMMAND.findall(page)
+    assert len(commands) == 2
+    for command, picture in commands:
+        rings = load_rings(resources().parent / command.split()[1])
+        shown = ET.parse(resources().parent / picture).getroot()
+        new = ET.fromstring(layout_picture(advise_layouts(rings, top=1)))
+        assert texts(shown) == texts(new)
+        assert [part.tag for part in shown.iter()] == [part.tag for part in new.iter()]
