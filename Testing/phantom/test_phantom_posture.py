@@ -95,6 +95,7 @@ def test_the_header_holds_the_true_positions_and_a_tilt_tag_of_the_other_sign(
         assert float(header.ImageOrientationPatient[5]) > 0.2
     told = json.loads((tmp_path / "one" / "truth.json").read_text())["image"]
     assert told["gantry_tilt_deg"] == pytest.approx(np.degrees(0.3))
+    assert told["spacing_mm"] == pytest.approx(TILTED.spacing_mm)
 
 
 @pytest.mark.parametrize("image_format", ["nrrd", "nifti", "metaimage"])
