@@ -18,8 +18,8 @@ Out = Annotated[Path | None, Parameter(help="Folder for figures, page, CSV and J
 Samples = Annotated[int, Parameter(help="Samples of each layout in the linear models.")]
 Full = Annotated[int, Parameter(help="Samples of each layout in the full simulation.")]
 Seed = Annotated[int, Parameter(help="Same seed, same numbers.")]
-Image = Annotated[Axes | None, Parameter(help="Error of a ball centre along x, y, z.")]
-Place = Annotated[Axes | None, Parameter(help="Installation error along x, y, z.")]
+Image = Annotated[Axes | None, Parameter(negative="", help="Error of a ball centre along x, y, z.")]
+Place = Annotated[Axes | None, Parameter(negative="", help="Installation error along x, y, z.")]
 Workers = Annotated[int | None, Parameter(help="Cores to use; none means all.")]
 Dask = Annotated[str | None, Parameter(help="Address of a Dask scheduler to spread the work over.")]
 

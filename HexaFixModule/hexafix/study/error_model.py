@@ -105,3 +105,16 @@ def error_maps(jacobians: Array, layouts: RingLayouts, errors: ErrorModel) -> Ar
 def exact_covariances(maps: Array) -> Array:
     """Covariances of the pose errors, shape (G, M, 6, 6N) of `error_maps` to (G, M, 6, 6)."""
     return maps @ np.swapaxes(maps, -1, -2)
+
+
+def absolute_covariances(covariances: Array) -> Array:
+    """Covariances of |ΔX| of normal errors ΔX, shape (..., 6, 6) to (..., 6, 6).
+
+    Notes
+    -----
+    E|x||y| = (2/π) σ_x σ_y (√(1-ρ²) + ρ arcsin ρ) for zero-mean normals of correlation ρ.
+    """
+    sigma = np.sqrt(np.diagonal(covariances, axis1=-2, axis2=-1))
+    product = sigma[..., :, None] * sigma[..., None, :]
+    rho = np.clip(covariances / product, -1.0, 1.0)
+    return 2.0 / np.pi * product * (np.sqrt(1.0 - rho**2) + rho * np.arcsin(rho) - 1.0)

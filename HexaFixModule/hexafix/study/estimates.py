@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.accuracy.jacobian import expected_errors
+from hexafix.errors import Fault, InputError
 from hexafix.progress import Progress, silent
 from hexafix.study.error_model import ErrorModel, error_maps, exact_covariances
 from hexafix.study.jacobians import model_jacobians
@@ -38,14 +39,33 @@ class StudySettings:
     errors : ErrorModel
     workers, backend
         As in `runner.in_order`.
+
+    Raises
+    ------
+    InputError
+        Fewer than two samples, a negative seed or no worker: before hours of work, not after.
     """
 
     samples: int = PAPER_SAMPLES
     full_samples: int = PAPER_SAMPLES
     seed: int = 0
-    errors: ErrorModel = field(default_factory=ErrorModel)
+    errors: ErrorModel = ErrorModel()  # noqa: RUF009 (frozen)
     workers: int | None = None
     backend: str | None = None
+
+    def __post_init__(self) -> None:
+        faults = [
+            Fault("bad-study", f"{name} is too small", value=str(value), limit=f"{least} or more")
+            for name, value, least in (
+                ("samples", self.samples, 2),
+                ("full_samples", self.full_samples, 2),
+                ("seed", self.seed, 0),
+                ("workers", 1 if self.workers is None else self.workers, 1),
+            )
+            if value < least
+        ]
+        if faults:
+            raise InputError(*faults)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +77,8 @@ class Estimates:
     layouts : RingLayouts
     exact : ndarray, shape (G, 2, 6)
         By covariance: the paper's linear model, and the linear model of the fit.
+    covariance : ndarray, shape (G, 2, 6, 6)
+        Of ΔX in the same models.
     sampled : Moments
         The same by Monte Carlo.
     full : ndarray, shape (G, 2, 6)
@@ -73,6 +95,7 @@ class Estimates:
 
     layouts: RingLayouts
     exact: Array
+    covariance: Array
     sampled: Moments
     full: Array
     full_volume_error: tuple[Array, Array]
@@ -92,7 +115,8 @@ def estimate(
 ) -> Estimates:
     """Every answer for every layout; layout g draws from the random stream ``stream + g``."""
     maps = error_maps(model_jacobians(layouts, settings.errors), layouts, settings.errors)
-    expected = expected_errors(exact_covariances(maps))
+    covariances = exact_covariances(maps)
+    expected = expected_errors(covariances)
     sampled = sample_moments(
         LinearKernel(
             np.ascontiguousarray(maps[:, PAPER_AND_FIT]), stream + np.arange(len(layouts))
@@ -105,7 +129,8 @@ def estimate(
         step=f"sample {len(layouts)} layouts",
     )
     full, spread = _simulated(layouts, maps, expected, settings, stream, progress)
-    return Estimates(layouts, expected[:, PAPER_AND_FIT], sampled, full, spread)
+    linear = covariances[:, PAPER_AND_FIT]
+    return Estimates(layouts, expected[:, PAPER_AND_FIT], linear, sampled, full, spread)
 
 
 def _simulated(

@@ -22,6 +22,7 @@ from hexafix.study.plotting import (
     VERMILLION,
     drawing,
     new_figure,
+    settle,
 )
 from hexafix.study.verdicts import EQUATION_26
 
@@ -51,7 +52,7 @@ def figure_5(study: NumberStudy) -> Any:
             axis.set_ylabel(f"expected |error| ({unit})")
             axis.set_xlabel("number of markers N, evenly around the ring")
         figure.legend(*_number_legend(), loc="outside lower center", ncols=6, columnspacing=1.6)
-        return figure
+        return settle(figure)
 
 
 def _number_panel(axis: Any, study: NumberStudy, rows: slice, names: str, scale: float) -> None:
@@ -65,7 +66,7 @@ def _number_panel(axis: Any, study: NumberStudy, rows: slice, names: str, scale:
     star = {"marker": "*", "markersize": 9, "color": "white", "linestyle": "none"}
     for q, (colour, mark) in enumerate(zip(COLOURS, "osD", strict=True)):
         beside = 0.16 * (q - 1)  # x and y coincide: their points stand side by side
-        width = 2.6 if q == 0 else 1.1  # and their lines one on the other
+        width = (2.8, 1.1, 1.6)[q]  # and their lines one on the other
         axis.plot(counts, exact[:, 0, q], color=colour, linewidth=width)
         axis.plot(counts, exact[:, 1, q], color=colour, linewidth=0.8 * width, linestyle=DASHES)
         axis.errorbar(
@@ -116,7 +117,7 @@ def figure_6(study: AnglesStudy) -> Any:
             bar.minorticks_off()
         axes[0].set_ylabel("included angle Δφ₂ (°)")
         figure.legend(*_map_legend(), loc="outside lower center", ncols=4)
-        return figure
+        return settle(figure)
 
 
 def _map(axis: Any, study: AnglesStudy, values: Array, levels: tuple[float, ...]) -> Any:
@@ -204,7 +205,7 @@ def figure_7(study: AnglesStudy) -> Any:
             "minimum included angle (°), at the left of its block; layouts sorted by minimum,"
             " median, maximum"
         )
-        return figure
+        return settle(figure)
 
 
 def _scatter(axis: Any, study: AnglesStudy, values: Array, colour: str) -> None:
@@ -241,22 +242,22 @@ def _limit_lines(
     """The paper's printed limits over the layouts they are about, and the worst of those."""
     space = "" if unit == "°" else " "
     count = len(study.found.layouts)
-    for rule, limit, colour, words in (
-        ("relaxed", limits[1], INK, "printed for the relaxed rule"),
-        ("preferred", limits[0], VERMILLION, "printed for the 45° rule"),
+    for rule, limit, colour, words, place in (
+        ("relaxed", limits[1], INK, "printed for the relaxed rule", (0.3, 0.78)),
+        ("preferred", limits[0], VERMILLION, "printed for the 45° rule", (0.6, 0.58)),
     ):
-        first = int(np.argmax(study.selections[rule]))
+        chosen = study.selections[rule]
+        first = int(np.argmax(chosen))
         axis.plot([first, count], [limit, limit], color=colour, linewidth=1.1, zorder=1)
+        style = {"color": colour, "fontsize": 7.5}
         up = rule == "relaxed"
-        near = {"textcoords": "offset points", "color": colour, "fontsize": 7.5}
-        paper = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
         axis.annotate(f"{limit:g}{space}{unit} {words}", (count, limit), ha="right",
                       va="bottom" if up else "top", xytext=(0, 2.5 if up else -2.5),
-                      **near)  # fmt: skip
-        worst = int(np.argmax(np.where(study.selections[rule], values, 0.0)))
+                      textcoords="offset points", **style)  # fmt: skip
+        worst = int(np.argmax(np.where(chosen, values, 0.0)))
         gaps = np.degrees(np.sort(study.found.layouts.included_angles_rad[worst]))
         name = "/".join(f"{gap:.0f}" for gap in gaps)
+        leader = {"arrowstyle": "-", "color": colour, "linewidth": 0.7}
         axis.annotate(f"{name}: {values[worst]:.2f}{space}{unit}", (worst, values[worst]),
-                      xytext=(6, 16),
-            bbox=paper, arrowprops={"arrowstyle": "-", "color": colour,
-                      "linewidth": 0.7}, **near)  # fmt: skip
+                      xytext=place, textcoords="axes fraction", arrowprops=leader,
+                      **style)  # fmt: skip

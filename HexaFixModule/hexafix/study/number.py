@@ -108,7 +108,7 @@ def study_number(
         by_count,
         jacobian_check(RingLayouts.of(CHECKED), settings.errors),
         sensitivity,
-        number_verdicts(by_count, sensitivity, settings),
+        number_verdicts(by_count, sensitivity),
     )
 
 

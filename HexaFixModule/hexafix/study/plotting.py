@@ -90,6 +90,13 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return figure
 
 
+def settle(figure: Any) -> Any:
+    """Place everything once and hold it: the engine would move it a little at every drawing."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    return figure
+
+
 def save(figure: Any, path: Path) -> None:
     """Write a figure; the suffix is its format, ``svg``, ``pdf`` or ``png``."""
     with drawing():

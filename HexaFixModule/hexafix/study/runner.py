@@ -12,6 +12,7 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from hexafix.errors import MissingLibrary
+from hexafix.threads import thread_count
 
 Result = TypeVar("Result")
 
@@ -35,7 +36,7 @@ def in_order(
     tasks : iterable of tuple
         Arguments; consumed as the work goes on.
     workers : int, optional
-        None: every core here, or every worker of a cluster.
+        None: the threads of `thread_count`, else every core here, or every worker of a cluster.
     backend : str, optional
         A joblib backend (``threading``, ``loky``, ``dask`` or one the caller registered). None:
         Dask if a client is connected, else the backend of the caller's ``parallel_config``, else
@@ -48,8 +49,9 @@ def in_order(
         return
     joblib = _joblib()
     context = joblib.parallel_config(backend=backend) if backend else nullcontext()
-    with context, joblib.Parallel(n_jobs=workers or -1, prefer="threads") as parallel:
-        for batch in _rounds(tasks, ROUND * max(1, joblib.effective_n_jobs(workers or -1))):
+    jobs = workers or (-1 if backend else _threads())
+    with context, joblib.Parallel(n_jobs=jobs, prefer="threads") as parallel:
+        for batch in _rounds(tasks, ROUND * max(1, joblib.effective_n_jobs(jobs))):
             yield from parallel(joblib.delayed(function)(*task) for task in batch)
 
 
@@ -106,10 +108,14 @@ def _joblib() -> Any:
 def _on_threads(
     function: Callable[..., Result], tasks: Iterable[tuple[Any, ...]], workers: int | None
 ) -> Iterator[Result]:
-    count = workers or (os.cpu_count() or 1)
+    count = workers or _threads()
     with ThreadPoolExecutor(count) as pool:
         for batch in _rounds(tasks, ROUND * count):
             yield from pool.map(lambda task: function(*task), batch)
+
+
+def _threads() -> int:
+    return thread_count(os.cpu_count() or 1)
 
 
 def _rounds(tasks: Iterable[tuple[Any, ...]], size: int) -> Iterator[list[tuple[Any, ...]]]:

@@ -121,14 +121,28 @@ class Moments:
             Where the volume error is taken, if not at the means.
         """
         at = self.mean if expected is None else expected
-        errors = []
-        for part in (slice(0, 3), slice(3, 6)):
-            direction = at[..., part] / np.linalg.norm(at[..., part], axis=-1, keepdims=True)
-            variance = np.einsum(
-                "...i,...ij,...j->...", direction, self.covariance[..., part, part], direction
-            )
-            errors.append(np.sqrt(np.maximum(variance, 0.0) / self.samples))
-        return errors[0], errors[1]
+        return volume_standard_errors(at, self.covariance, self.samples)
+
+
+def volume_standard_errors(expected: Array, covariance: Array, samples: int) -> tuple[Array, Array]:
+    """Standard errors of the volume errors of means, in mm and in rad, shape (...) each.
+
+    Parameters
+    ----------
+    expected : ndarray, shape (..., 6)
+        The means.
+    covariance : ndarray, shape (..., 6, 6)
+        Of one sample.
+    samples : int
+    """
+    errors = []
+    for part in (slice(0, 3), slice(3, 6)):
+        direction = expected[..., part] / np.linalg.norm(expected[..., part], axis=-1)[..., None]
+        variance = np.einsum(
+            "...i,...ij,...j->...", direction, covariance[..., part, part], direction
+        )
+        errors.append(np.sqrt(np.maximum(variance, 0.0) / samples))
+    return errors[0], errors[1]
 
 
 def sample_moments(

@@ -35,8 +35,8 @@ def sweep_speed(*, workers: int | None = None, rounds: int = 3) -> dict[str, Any
     -------
     dict
         ``layouts``, ``samples``, ``sweep_s`` (Jacobian matrices included), ``loop_s`` (one sample
-        at a time, on some layouts, scaled to all), ``ratio``, ``memory_ratio`` (peak of 256 000
-        samples over that of 32 000).
+        at a time, on some layouts, scaled to all), ``ratio``, ``memory_ratio`` (peak of a million
+        samples of one layout over that of a quarter of them).
     """
     errors, layouts = ErrorModel(), three_marker_layouts()
     seconds = []
@@ -49,8 +49,8 @@ def sweep_speed(*, workers: int | None = None, rounds: int = 3) -> dict[str, Any
     for maps in _kernel(some, errors).maps:
         plain_loop(maps[0], PAPER_SAMPLES, np.random.default_rng(0))
     loop = (time.perf_counter() - start) * len(layouts) / LOOPED
-    tiny = some.take(slice(0, 4))
-    few = [_peak(_kernel(tiny, errors), count * BLOCK) for count in (16, 128)]
+    one = some.take(slice(0, 1))
+    few = [_peak(_kernel(one, errors), count * BLOCK) for count in (128, 512)]
     return {
         "layouts": len(layouts),
         "samples": PAPER_SAMPLES,

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.study.estimates import PAPER_SAMPLES, Estimates, StudySettings, volumes
+from hexafix.study.error_model import absolute_covariances
+from hexafix.study.estimates import PAPER_SAMPLES, Estimates, volumes
 from hexafix.study.layouts import angle_rules
+from hexafix.study.sampling import volume_standard_errors
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,9 @@ Figures = tuple[float, float, float, float]
 
 LITTLE = 1.1
 """An effect of less than a tenth counts as little."""
+
+UNITS = ((1.0, "mm"), (180.0 / np.pi, "°"))
+"""Scale and unit of position and orientation in verdicts."""
 
 SURE = 3.0
 """Standard errors beyond which a printed figure counts as not reproduced."""
@@ -87,60 +92,56 @@ class Verdict:
 
 
 def number_verdicts(
-    by_count: dict[int, Estimates], sensitivity: dict[str, float], settings: StudySettings
+    by_count: dict[int, Estimates], sensitivity: dict[str, float]
 ) -> tuple[Verdict, ...]:
     """Verdicts on Eq. (26), the gain of six markers and what Section 4 says of the trend."""
-    return (
-        *_equation_26(by_count[3], settings),
-        *_reductions(by_count, settings),
-        *_trend(by_count, sensitivity),
-    )
+    return (*_equation_26(by_count[3]), *_reductions(by_count), *_trend(by_count, sensitivity))
 
 
-def _equation_26(three: Estimates, settings: StudySettings) -> Iterator[Verdict]:
+def _equation_26(three: Estimates) -> Iterator[Verdict]:
     scale = np.array([1.0] * 3 + [180.0 / np.pi] * 3)
+    variance = np.diagonal(absolute_covariances(three.covariance[0, 0]))
     # the paper's own chance: its K_s samples, and half a unit of the last printed decimal
-    chance = three.sampled.standard_error[0, 0] * np.sqrt(settings.samples / PAPER_SAMPLES)
+    errors = np.hypot(np.sqrt(variance / PAPER_SAMPLES) * scale, 0.0005 / np.sqrt(3.0))
     for q, (name, printed, unit) in enumerate(EQUATION_26):
-        exact = float(three.exact[0, 0, q] * scale[q])
-        error = float(np.hypot(chance[q] * scale[q], 0.0005 / np.sqrt(3.0)))
-        yield Verdict(
-            f"expected error of {name}, N = 3",
-            "Eq. (26)",
-            unit,
-            printed,
-            exact,
-            float(three.sampled.mean[0, 0, q] * scale[q]),
-            float(three.full[0, 0, q] * scale[q]),
-            float(three.full[0, 1, q] * scale[q]),
-            *_value(printed, exact, error),
-        )
+        ours = _each(three, lambda e, q=q: e[0, q] * scale[q])
+        status, away = _reproduced(printed, ours[0], float(errors[q]))
+        words = f"printed {100.0 * (printed / ours[0] - 1.0):+.1f} % from ours, {away}"
+        yield Verdict(f"expected error of {name}, N = 3", "Eq. (26)", unit, printed, *ours,
+                      status, words)  # fmt: skip
 
 
-def _value(printed: float, exact: float, error: float) -> tuple[str, str]:
+def _reproduced(printed: float, exact: float, error: float) -> tuple[str, str]:
     """Status and words for a printed value with its standard error."""
-    away = (printed - exact) / error
-    status = "reproduced" if abs(away) <= SURE else "not reproduced"
-    side = "above" if away > 0 else "below"
-    percent = 100.0 * abs(printed / exact - 1.0)
-    return status, f"printed {percent:.1f} % {side} ours, {abs(away):.1f} standard errors"
+    away = abs(printed - exact) / error
+    status = "reproduced" if away <= SURE else "not reproduced"
+    return status, f"{away:.1f} standard errors of {PAPER_SAMPLES} samples"
 
 
-def _reductions(by_count: dict[int, Estimates], settings: StudySettings) -> Iterator[Verdict]:
+def _reductions(by_count: dict[int, Estimates]) -> Iterator[Verdict]:
     three, six = by_count[3], by_count[6]
-    chance = np.sqrt(settings.samples / PAPER_SAMPLES)
     for part, (name, printed) in enumerate(REDUCTIONS):
         before, after = (_each(found, lambda e, p=part: volumes(e[0])[p]) for found in (three, six))
         ours = _paired(before, after, lambda b, a: 100.0 * (1.0 - a / b))
-        relative = [
-            float(found.sampled.volume_standard_error()[part][0, 0] / exact)
-            for found, exact in ((three, before[0]), (six, after[0]))
-        ]
-        by_chance = (100.0 - ours[0]) * np.hypot(relative[0], relative[1]) * chance
+        relative = [_volume_error(e)[part] / v[0] for e, v in ((three, before), (six, after))]
+        by_chance = (100.0 - ours[0]) * np.hypot(relative[0], relative[1])
         error = float(np.hypot(by_chance, 0.5 / np.sqrt(3.0)))
+        status, away = _reproduced(printed, ours[0], error)
+        stated = np.linalg.norm([value for _, value, _ in EQUATION_26][3 * part : 3 * part + 3])
+        implied, scale, unit = stated * (1.0 - printed / 100.0), *UNITS[part]
+        words = (
+            f"printed {printed - ours[0]:+.1f} points from ours, {away}; with Eq. (26) as printed"
+            f" it gives {implied:.3f} {unit} for N = 6, ours {after[0] * scale:.3f} {unit}"
+        )
         claim = f"less volume error of {name}, N = 6 against 3"
-        verdict = _value(printed, ours[0], error)
-        yield Verdict(claim, "Section 4.3.1", "%", printed, *ours, *verdict)
+        yield Verdict(claim, "Section 4.3.1", "%", printed, *ours, status, words)
+
+
+def _volume_error(found: Estimates) -> tuple[float, float]:
+    """Chance of the paper's volume errors, of its samples, first layout, mm and rad."""
+    spread = absolute_covariances(found.covariance[0, 0])
+    mm, rad = volume_standard_errors(found.exact[0, 0], spread, PAPER_SAMPLES)
+    return float(mm), float(rad)
 
 
 def _trend(by_count: dict[int, Estimates], sensitivity: dict[str, float]) -> Iterator[Verdict]:
