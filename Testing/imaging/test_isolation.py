@@ -54,6 +54,43 @@ def test_a_hang_ends_at_the_time_limit(monkeypatch, tmp_path):
     assert refusal(seconds=0.5) == ("decoder-died", "H52")
 
 
+def test_the_time_limit_is_for_each_result_and_not_for_all(monkeypatch, tmp_path):
+    head = json.dumps({"shape": [1], "dtype": "|u1"})
+    body = f"""
+import sys, time
+for turn in range(5):
+    time.sleep(0.6)
+    sys.stdout.write({head!r} + "\\nx"); sys.stdout.flush()
+"""
+    stand_in(monkeypatch, tmp_path, body)
+    with closing(run_isolated("decode", [], memory_bytes=GIGABYTE, seconds=2.5)) as results:
+        assert len(list(results)) == 5
+
+
+def test_what_the_caller_does_between_results_is_not_counted(monkeypatch, tmp_path):
+    head = json.dumps({"shape": [1], "dtype": "|u1"})
+    body = f"""
+import sys
+sys.stdout.write(({head!r} + "\\nx") * 2); sys.stdout.flush()
+"""
+    stand_in(monkeypatch, tmp_path, body)
+    with closing(run_isolated("decode", [], memory_bytes=GIGABYTE, seconds=2.0)) as results:
+        next(results)
+        time.sleep(2.5)
+        next(results)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["no json", "[]", '{"shape": [-1, 4], "dtype": "<i2"}', '{"shape": [1], "dtype": "O"}',
+     '{"shape": ["x"], "dtype": "<i2"}', '{"shape": [4]}', "x" * (1 << 21)],
+    ids=["text", "list", "negative", "objects", "words", "short", "endless"],
+)  # fmt: skip
+def test_an_answer_that_is_none_is_a_refusal(monkeypatch, tmp_path, line):
+    stand_in(monkeypatch, tmp_path, f"print({line!r})")
+    assert refusal() == ("decoder-died", "H52")
+
+
 def test_a_result_cut_short_is_a_refusal(monkeypatch, tmp_path):
     head = json.dumps({"shape": [4, 4], "dtype": "<i2"})
     stand_in(monkeypatch, tmp_path, f"print({head!r}); print('short', end='')")

@@ -114,8 +114,9 @@ def _receive(
     try:
         about = json.loads(line)
         error = about.get("error")
-        shape, dtype = (0,) if error else about["shape"], np.dtype(about.get("dtype", "u1"))
-        size = math.prod(shape) * dtype.itemsize
+        shape = [0] if error else [int(side) for side in about["shape"]]
+        dtype = np.dtype(about.get("dtype", "u1"))
+        size = math.prod(shape) * dtype.itemsize if min(shape, default=0) >= 0 else -1
     except (ValueError, TypeError, KeyError, AttributeError):
         raise _died() from None
     if error:
