@@ -4,7 +4,7 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
-from hexafix.accuracy import angle_rule, check_layouts, layout_faults
+from hexafix.accuracy import advisor, angle_rule, check_layouts, layout_faults
 from hexafix.accuracy.advised import AdviceRules, RingTask, assess
 from hexafix.accuracy.advisor import advise
 from hexafix.accuracy.joint_error import ErrorTarget, place_error, unit_square_errors
@@ -138,6 +138,15 @@ def test_the_best_pairs_are_those_of_trying_every_pair():
     errors = [proposal.error_mm for proposal in found.proposals]
     assert errors == pytest.approx(sorted(wanted.values()), rel=1e-9)
     assert all(proposal.exchange_mm >= RULES.margin_mm for proposal in found.proposals)
+
+
+def test_pairs_are_the_best_however_few_are_looked_at_first(monkeypatch):
+    rings = HoleCircle(16, 100.0), HoleCircle(18, 100.0)
+    tasks = [task(rings[0], 3), task(rings[1], 3, "distal", first_number=4)]
+    wanted = [p.error_mm for p in advise(tasks, top=6).proposals]
+    monkeypatch.setattr(advisor, "FIRST_PAIRED", 1)
+    found = [p.error_mm for p in advise(tasks, top=6).proposals]
+    assert found == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_given_other_ring_is_kept_apart_from():

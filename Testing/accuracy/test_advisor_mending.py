@@ -72,6 +72,15 @@ def test_nothing_is_moved_into_a_taken_hole_or_to_a_height_there_is_not(layout_a
     assert fewest_moves(task(layout_at([0, 120, 240]), few), AdviceRules(), mirror=False) is None
 
 
+def test_a_move_that_breaks_the_angle_rule_mends_nothing(layout_at):
+    present = layout_at([0, 40, 80])
+    # With one marker at 120 degrees two others stay 40 degrees apart, or it does.
+    places = SiteList((MarkerSite(1, 100.0, np.radians(120.0), 20.0),))
+    assert fewest_moves(task(present, places), AdviceRules(), mirror=False) is None
+    wider = SiteList((MarkerSite(1, 100.0, np.radians(130.0), 20.0),))
+    assert fewest_moves(task(present, wider), AdviceRules(), mirror=False) is not None
+
+
 def test_a_mended_ring_is_kept_apart_from_the_other(layout_at):
     other = layout_at([0, 100, 220], 4)
     present = layout_at([0, 120, 240])
