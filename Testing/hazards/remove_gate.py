@@ -89,7 +89,7 @@ class Tests:
 
     def _start(self) -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, "-B", str(Path(__file__).with_name("remove_server.py"))],
+            [sys.executable, str(Path(__file__).with_name("remove_server.py"))],
             cwd=self.copy,
             env=self.environment,
             stdin=subprocess.PIPE,
