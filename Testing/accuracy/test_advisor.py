@@ -332,6 +332,14 @@ def test_every_numbering_counts_and_not_only_the_likely_ones():
     assert keep_margins(points, unique - 0.01, None).all()
 
 
+def test_markers_near_one_line_are_left_out_however_unique():
+    flat = np.array([[[100.0, 0.0, 20.0], [20.0, 9.0, 20.0], [-100.0, 0.0, 20.0]]])
+    assert smallest_rms(flat[0], flat[0], every_order(3)[1:]) > 8.0
+    assert not keep_margins(flat, 8.0, None).any()
+    flat[0, 1, 1] = 11.0
+    assert keep_margins(flat, 8.0, None).all()
+
+
 def test_no_two_balls_are_nearer_than_the_spacing():
     circle = HoleCircle(36, 100.0)
     found = {}
