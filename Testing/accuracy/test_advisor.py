@@ -142,7 +142,7 @@ def test_the_best_pairs_are_those_of_trying_every_pair():
 
 def test_pairs_are_the_best_however_few_are_looked_at_first(monkeypatch):
     # The first ring's errors rise in large steps, the second's in small ones.
-    rings = HoleCircle(9, 100.0, heights_mm=(20.0,)), HoleCircle(36, 100.0, heights_mm=(20.0,))
+    rings = HoleCircle(12, 100.0, heights_mm=(20.0,)), HoleCircle(36, 100.0, heights_mm=(20.0,))
     tasks = [task(rings[0], 3), task(rings[1], 3, "distal", first_number=4)]
     found = []
     for first in (512, 3):
