@@ -6,7 +6,7 @@ import types
 import joblib
 import numpy as np
 import pytest
-from hexafix.errors import MissingLibrary
+from hexafix.errors import InputError, MissingLibrary
 from hexafix.study import ErrorModel, runner
 from hexafix.study.error_model import error_maps
 from hexafix.study.jacobians import model_jacobians
@@ -14,6 +14,7 @@ from hexafix.study.layouts import three_marker_layouts
 from hexafix.study.runner import ROUND, dask_cluster, dask_connected, in_order
 from hexafix.study.sampling import LinearKernel, sample_moments
 from joblib._parallel_backends import ThreadingBackend
+from joblib.externals.loky import get_reusable_executor
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +43,8 @@ def assert_same(found, alone):
 @pytest.mark.parametrize("backend", [None, "threading", "loky"])
 def test_every_backend_gives_the_same_bits(kernel, alone, backend):
     assert_same(moments(kernel, workers=2, backend=backend), alone)
+    if backend == "loky":
+        get_reusable_executor().shutdown(wait=True)
 
 
 def test_threads_serve_where_joblib_is_missing(kernel, alone, monkeypatch):
@@ -134,6 +137,16 @@ def test_an_address_connects_a_client_and_closes_it(a_cluster):
 def test_an_address_without_dask_is_refused_with_the_way_out(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingLibrary, match="pip install distributed"), dask_cluster("tcp://x:1"):
+        pass
+
+
+@pytest.mark.parametrize("failure", [OSError("timed out"), ValueError("unknown address scheme")])
+def test_an_address_where_nobody_answers_is_refused(a_cluster, failure):
+    def client(address):
+        raise failure
+
+    a_cluster.Client = client
+    with pytest.raises(InputError, match="no Dask scheduler answers"), dask_cluster("tcp://x:1"):
         pass
 
 

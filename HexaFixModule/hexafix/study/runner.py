@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from itertools import islice
 from typing import Any, TypeVar
 
-from hexafix.errors import MissingLibrary
+from hexafix.errors import InputError, MissingLibrary
 from hexafix.threads import thread_count
 
 Result = TypeVar("Result")
@@ -75,6 +75,8 @@ def dask_cluster(address: str | None) -> Iterator[None]:
     ------
     MissingLibrary
         If dask.distributed or joblib is not installed.
+    InputError
+        If no scheduler answers at the address.
     """
     if address is None:
         yield
@@ -89,7 +91,17 @@ def dask_cluster(address: str | None) -> Iterator[None]:
             where="--dask",
             next_step="pip install distributed",
         ) from error
-    with Client(address):
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise InputError.of(
+            "no-scheduler",
+            "no Dask scheduler answers",
+            value=address,
+            where="--dask",
+            next_step="give the address that the scheduler prints, such as tcp://host:8786",
+        ) from error
+    with client:
         yield
 
 
