@@ -12,7 +12,11 @@ import pytest
 from hexafix.errors import HexaFixError, ImageRefused, InputError
 from hexafix.imaging import dicom_header, header_file, read_volume
 from hexafix.imaging.header_file import NotAnImage
-from pydicom.uid import DeflatedExplicitVRLittleEndian, ExplicitVRBigEndian
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    ExplicitVRBigEndian,
+    ExplicitVRLittleEndian,
+)
 
 UNDEFINED = b"\xff\xff\xff\xff"
 
@@ -261,3 +265,16 @@ def test_doubles_are_compared_pair_by_pair(tmp_path, writer, grid):
     copies[3].PixelData = values.tobytes()
     writer.save(tmp_path, [*items, *copies])
     assert codes(tmp_path) == {"duplicate-slice"}
+
+
+@pytest.mark.parametrize("case", ["decoded", "padded"])
+def test_bits_above_the_lowest_places_are_refused_where_they_are_ambiguous(
+    case, tmp_path, writer, grid
+):
+    items = writer.slices(grid)
+    for item in items:
+        item.BitsStored, item.HighBit = 12, 15
+        if case == "padded":
+            item.add_new("PixelPaddingValue", "US", 0)
+    syntax = DeflatedExplicitVRLittleEndian if case == "decoded" else ExplicitVRLittleEndian
+    assert codes(writer.save(tmp_path, items, syntax=syntax)) == {"pixel-format"}

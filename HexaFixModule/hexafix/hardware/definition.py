@@ -21,6 +21,8 @@ _TOP = ("schema_version", "id", "name", "source", "proximal", "distal", "strut")
 _RING = ("joints_mm", "thickness_mm", "outer_radius_mm", "holes")
 _STRUT = ("min_mm", "max_mm", "scale_offset_mm")
 _OPTIONAL = ("scale_offset_mm", "holes")
+LARGEST_MM = 1e5
+"""No length or coordinate of a fixator is larger; NaN and infinity are not either."""
 CLOSEST_JOINTS_MM = 1.0
 """Two joint centres of a ring nearer than this are a typing error."""
 
@@ -119,10 +121,7 @@ def fixator_from_document(document: Any, *, where: str = "fixator") -> Fixator:
 
 def _is_number(value: Any) -> bool:
     return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and abs(value) <= 1e300
-        and math.isfinite(value)
+        isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_MM
     )
 
 
@@ -163,7 +162,12 @@ class _Check:
             return math.nan
         value = entries[key]
         if not _is_number(value):
-            self.fault("not-a-number", "a finite number is needed", f"{where}.{key}", repr(value))
+            self.fault(
+                "not-a-number",
+                "a finite number of sensible size is needed",
+                f"{where}.{key}",
+                repr(value),
+            )
             return math.nan
         if value <= low:
             self.fault("out-of-range", "too small", f"{where}.{key}", f"{value} mm", f"> {low} mm")
@@ -199,7 +203,7 @@ class _Check:
         for index, row in enumerate(value):
             if not isinstance(row, list | tuple) or len(row) != 3 or not all(map(_is_number, row)):
                 good = False
-                what = "three finite numbers are needed"
+                what = "three finite numbers of sensible size are needed"
                 self.fault("wrong-shape", what, f"{where}[{index}]", repr(row), "[x, y, z] mm")
         if not good:
             return None

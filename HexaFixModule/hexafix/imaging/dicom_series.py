@@ -19,6 +19,8 @@ from hexafix.imaging.pixel_data import faults_of_length
 from hexafix.imaging.slice_stack import TILT_TOLERANCE_DEG, arrange, listed
 from hexafix.progress import Progress, silent
 
+# A study with all its reconstructions has some ten thousand; a whole disk has millions.
+MAX_FILES = 200_000
 SECONDARY_CAPTURE = "1.2.840.10008.5.1.4.1.1.7"
 _SCOUT_WORDS = {"LOCALIZER", "SCOUT", "TOPOGRAM", "SURVIEW"}
 
@@ -116,8 +118,18 @@ def _files(folder: Path) -> Iterable[Path]:
             next_step="check the path and its access rights",
         )
 
+    count = 0
     for root, folders, names in os.walk(folder, onerror=fail):
         folders.sort()
+        count += len(names)
+        if count > MAX_FILES:
+            raise InputError.of(
+                "too-many-files",
+                "the image folder holds more files than any CT",
+                value=f"more than {MAX_FILES}",
+                limit=str(MAX_FILES),
+                next_step="give the folder of the series alone",
+            )
         yield from (Path(root, name) for name in sorted(names))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.errors import Fault, ImageRefused
-from hexafix.imaging.dicom_header import EXPLICIT_BIG, SliceHeader
+from hexafix.imaging.dicom_header import EXPLICIT_BIG, PLAIN_SYNTAXES, SliceHeader
 
 AIR_HU = -1024
 _INT16 = np.iinfo(np.int16)
@@ -70,6 +70,11 @@ def faults_of_values(slices: Sequence[SliceHeader]) -> list[Fault]:
 
 def _format_ok(item: SliceHeader) -> bool:
     pixels = item.pixels
+    # Bits above the lowest places: decoders take the lowest ones all the same, and what padding
+    # would mean there nobody says.
+    shifted = pixels.high_bit != pixels.bits_stored - 1
+    if shifted and (pixels.transfer_syntax not in PLAIN_SYNTAXES or pixels.padding is not None):
+        return False
     return (
         pixels.samples == 1
         and pixels.signed is not None

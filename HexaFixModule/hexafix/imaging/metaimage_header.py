@@ -58,8 +58,12 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     data_file = fields.get("elementdatafile", "")
     if data_file.upper().startswith("LIST"):
         raise ImageRefused(detached_fault(where))
-    if data_file.upper() != "LOCAL" and outside_folder(path, data_file):
+    local = data_file.upper() == "LOCAL"
+    if not local and outside_folder(path, data_file):
         raise ImageRefused(detached_fault(where))
+    if not local and not (path.parent / data_file).is_file():
+        # A FIFO would keep its reader waiting, too.
+        raise _broken("ElementDataFile is not there, or no file")
     size = _numbers(fields, ("dimsize",), where)
     require_three_dimensions(len(size), where)
     spacing = _numbers(fields, ("elementspacing",), where)
@@ -82,10 +86,13 @@ def read_metaimage_header(path: Path) -> FileGeometry:
     shape = (int(size[0]), int(size[1]), int(size[2]))
     if fields.get("binarydata", "false")[:1].lower() not in ("t", "1", "y"):
         raise _broken("voxels written as text")
+    packed = fields.get("compresseddata", "false")[:1].lower() in ("t", "1", "y")
+    if (local or packed) and fields.get("headersize", "0") != "0":
+        raise _broken("voxels behind a header of their own")
     orders = [fields[key][:1].lower() for key in _BYTE_ORDERS if key in fields]
     if len(set(orders)) > 1:
         raise _broken("two byte orders")
-    if fields.get("compresseddata", "false")[:1].lower() in ("t", "1", "y"):
+    if packed:
         _verify_packed(path, data_file, shape, fields)
     affine = np.eye(4)
     # Each run of three numbers is the direction of one index axis.
@@ -102,8 +109,6 @@ def _verify_packed(
     voxel_type = fields.get("elementtype", "")
     if voxel_type not in _VOXEL_BYTES:
         raise _broken("a type of voxel that HexaFix does not read")
-    if fields.get("headersize", "0") != "0":
-        raise _broken("compressed data behind a header of their own")
     expected = math.prod(size_ijk) * _VOXEL_BYTES[voxel_type]
     # 47: the widest window, zlib or gzip by their headers.
     inflater, counted, taken = zlib.decompressobj(47), 0, 0

@@ -47,6 +47,9 @@ def read_nrrd_header(path: Path) -> FileGeometry:
     data_file = fields.get("data file", fields.get("datafile"))
     if data_file is not None and _leaves_folder(path, data_file):
         raise ImageRefused(detached_fault(where))
+    if data_file is not None and not all(map(Path.is_file, _data_files(path, data_file))):
+        # A FIFO would keep its reader waiting, too.
+        raise _broken("data file is not there, or no file")
     if fields.get("encoding", "").strip().lower() not in _ENCODINGS:
         # Text is read so loosely that damage to it becomes other numbers.
         raise _broken("encoding")
@@ -140,6 +143,13 @@ def _leaves_folder(path: Path, data_file: str) -> bool:
         return any(outside_folder(path, entry.strip()) for entry in entries)
     # "name%03d.raw 1 10 1" numbers its files; the name decides the folder.
     return outside_folder(path, first)
+
+
+def _data_files(path: Path, data_file: str) -> list[Path]:
+    """The files of voxels that the header names one by one."""
+    first, *entries = data_file.splitlines()
+    named = entries if first.upper().startswith("LIST") else [] if "%" in first else [first]
+    return [path.parent / entry.strip() for entry in named if entry.strip()]
 
 
 def _broken(what: str) -> InputError:
