@@ -166,10 +166,14 @@ def _choices(places: Places, count: int) -> NDArray[np.intp]:
         )
         return around[_combinations(len(places.sites), count)]
     others = _combinations(places.count - 1, count - 1) + 1
+    gaps = np.empty((len(others), count), np.intp)
+    gaps[:, 0], gaps[:, -1] = others[:, 0], places.count - others[:, -1]
+    gaps[:, 1:-1] = others[:, 1:] - others[:, :-1]
+    largest = gaps[:, 0] >= gaps[:, 1]
+    for k in range(2, count):
+        largest &= gaps[:, 0] >= gaps[:, k]
+    others, gaps = others[largest], gaps[largest]
     chosen = np.concatenate([np.zeros((len(others), 1), np.intp), others], axis=1)
-    gaps = np.diff(np.append(chosen, np.full((len(chosen), 1), places.count), axis=1), axis=1)
-    largest = gaps[:, 0] == gaps.max(axis=1)
-    chosen, gaps = chosen[largest], gaps[largest]
     weight = (places.count + 1) ** np.arange(count)[::-1]
     word = gaps @ weight
     best = np.ones(len(gaps), bool)
