@@ -106,7 +106,7 @@ def each_once(layouts):
 SMALL = {
     3: HoleCircle(14, 100.0, np.radians(7.0), (20.0, 45.0), occupied=(2, 5, 6)),
     4: HoleCircle(11, 100.0, np.radians(-3.0), (20.0, 45.0), occupied=(4, 8)),
-    5: HoleCircle(9, 100.0, 0.0, (10.0, 45.0), occupied=(3,)),
+    5: HoleCircle(8, 100.0, 0.0, (10.0, 45.0), occupied=(3,)),
 }
 
 

@@ -134,6 +134,7 @@ def list_candidates(
             value=str(count),
             limit=f"{MARKERS[0]} to {MARKERS[1]}",
             hazard="H13",
+            next_step="ask for 3 to 5 markers a ring",
         )
     heights = _patterns(places, count, out_of_plane_mm)
     _refuse_too_many(places, count, len(heights))
