@@ -35,9 +35,9 @@ LADDER = {
     "pipeline": 10,
     "benchmark": 11,
     "scenarios": 11,
-    "study": 11,
-    "cli": 12,
-    "__main__": 13,
+    "study": 12,
+    "cli": 13,
+    "__main__": 14,
 }
 """Each room's level: a room may import rooms of lower levels only."""
 

@@ -24,7 +24,7 @@ from hexafix.geometry import Pose
 from hexafix.imaging import Volume
 from hexafix.markers import find_balls
 from hexafix.phantom import make_phantom
-from hexafix.phantom.local import LocalTruth, Scene, render_ball
+from hexafix.phantom.local import Scene, render_ball
 from hexafix.phantom.spec import PhantomSpec
 
 SITUATIONS: dict[str, tuple[Scene, float]] = {
@@ -76,7 +76,8 @@ def _situation(
     errors, paper, along, paper_along, stated = [], [], [], [], []
     for _ in range(placements):
         volume, truth = render_ball(scene, rng)
-        error = _paper_center(volume, truth) - truth.center_mm
+        center = isosurface_center(volume, near_mm=truth.center_mm, diameter_mm=truth.diameter_mm)
+        error = center - truth.center_mm
         paper.append(np.linalg.norm(error))
         paper_along.append(error @ truth.rod_direction)
         found = find_balls(volume, ball_diameter_mm=scene.ball_diameter_mm)
@@ -102,10 +103,45 @@ def _situation(
     }
 
 
-def _paper_center(volume: Volume, truth: LocalTruth) -> NDArray[np.float64]:
-    """Centre by isosurface at half height and least squares, shape (3,), LPS mm.
+def isosurface_center(
+    volume: Volume, *, near_mm: NDArray[np.float64], diameter_mm: float
+) -> NDArray[np.float64]:
+    """Centre by isosurface at half height and least squares, the paper's recipe.
 
-    Source: Section 3.2. The true place only picks the ball's surface out of the crop.
+    Parameters
+    ----------
+    volume : Volume
+        A crop: the surface is sought in all of it.
+    near_mm : ndarray, shape (3,)
+        A point inside the ball, LPS mm: it only picks the ball's surface out of the crop.
+    diameter_mm : float
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        LPS mm.
+
+    Notes
+    -----
+    Source: Section 2.1.
+    """
+    marching_cubes = isosurface_finder()
+    values = np.asarray(volume.voxels, np.float32)
+    place = np.rint(volume.ijk_from_lps(near_mm)).astype(int)
+    level = 0.5 * (float(values[place[2], place[1], place[0]]) - 1000.0)
+    vertices = marching_cubes(values, level)[0]
+    points = volume.lps_from_ijk(vertices[:, ::-1])
+    points = points[np.linalg.norm(points - near_mm, axis=1) < 0.75 * diameter_mm]
+    return _least_squares_sphere(points)
+
+
+def isosurface_finder() -> Any:
+    """Marching cubes of scikit-image.
+
+    Raises
+    ------
+    MissingLibrary
+        If it is not installed.
     """
     try:
         from skimage.measure import marching_cubes
@@ -115,13 +151,7 @@ def _paper_center(volume: Volume, truth: LocalTruth) -> NDArray[np.float64]:
             "the paper's recipe in the benchmark needs scikit-image",
             next_step="install hexafix[benchmark]",
         ) from error
-    values = np.asarray(volume.voxels, np.float32)
-    place = np.rint(volume.ijk_from_lps(truth.center_mm)).astype(int)
-    level = 0.5 * (float(values[place[2], place[1], place[0]]) - 1000.0)
-    vertices = marching_cubes(values, level)[0]
-    points = volume.lps_from_ijk(vertices[:, ::-1])
-    points = points[np.linalg.norm(points - truth.center_mm, axis=1) < 0.75 * truth.diameter_mm]
-    return _least_squares_sphere(points)
+    return marching_cubes
 
 
 def _least_squares_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:
