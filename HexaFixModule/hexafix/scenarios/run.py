@@ -158,11 +158,12 @@ def _words(faults: Mapping[str, str | None]) -> str:
 
 
 def _place(error: Exception) -> str:
+    """Kind and place of an error, without its words: they may hold a path."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     where = f" at {Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else ""
-    return f"{type(error).__name__}{where}: {error}"
+    return f"{type(error).__name__}{where}"
 
 
 def _played(
