@@ -156,11 +156,12 @@ def _between(values: NDArray, fraction: float, axis: int) -> NDArray:
     No value leaves the range of the two voxels that it lies between: air stays air, and what the
     scanner clipped stays flat at the clipping value, which gates ask for.
     """
-    rows = np.moveaxis(values, axis, 0).astype(np.float64, copy=False)
+    rows = np.moveaxis(values, axis, 0)
     # Continued oddly about its ends, so that a slope goes on there and is not bent.
     edges = [(_EDGE, _EDGE), (0, 0)]
-    longer = np.pad(rows, edges, mode="reflect", reflect_type="odd")
-    terms = spline_filter1d(longer, order=3, axis=0, mode="mirror")
+    # Single precision keeps a thousandth of a HU, and half the memory traffic.
+    longer = np.pad(rows.astype(np.float32), edges, mode="reflect", reflect_type="odd")
+    terms = spline_filter1d(longer, order=3, axis=0, output=np.float32, mode="mirror")
     count = len(rows) - 1
     before, after = 1.0 - fraction, fraction
     # The cubic B-spline at the distances of the four nearest voxels.
@@ -170,9 +171,9 @@ def _between(values: NDArray, fraction: float, axis: int) -> NDArray:
         2.0 / 3.0 - before**2 + before**3 / 2.0,
         after**3 / 6.0,
     )
-    moved = np.zeros((count, rows.shape[1]))
+    moved = np.zeros((count, rows.shape[1]), np.float32)
     for tap, weight in zip(range(-1, 3), weights, strict=True):
-        moved += weight * terms[_EDGE + tap : _EDGE + tap + count]
-    lowest = np.minimum(rows[:-1], rows[1:])
-    np.clip(moved, lowest, np.maximum(rows[:-1], rows[1:]), out=moved)
+        moved += np.float32(weight) * terms[_EDGE + tap : _EDGE + tap + count]
+    np.maximum(moved, np.minimum(rows[:-1], rows[1:]), out=moved)
+    np.minimum(moved, np.maximum(rows[:-1], rows[1:]), out=moved)
     return np.moveaxis(moved, 0, axis)
