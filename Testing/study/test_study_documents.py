@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ def run(capsys, *arguments):
 def test_the_number_document_is_finite_json_with_units(a_number_study):
     document = json.loads(json.dumps(a_number_study.as_json(), allow_nan=False))
     assert document["schema_version"] == 1
+    assert document["simulated"] is True
     assert [row["markers"] for row in document["rows"]] == sorted(2 * list(range(3, 11)))
     row = document["rows"][0]
     exact = a_number_study.by_count[3].exact[0, 0]
@@ -162,6 +164,21 @@ def test_other_errors_scale_the_answer(capsys):
 def test_a_wrong_command_line_exits_with_2(capsys, arguments):
     code, _, _ = run(capsys, *arguments, "-q")
     assert code == 2
+
+
+def test_a_cluster_without_its_library_is_told_before_the_work(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    code, out, err = run(capsys, "number", "--dask", "tcp://scheduler:8786", "-q")
+    assert (code, out) == (2, "")
+    assert "pip install distributed" in err
+
+
+def test_figures_without_matplotlib_are_told_before_the_work(capsys, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, out, err = run(capsys, "number", "--out", tmp_path / "study", "-q")
+    assert (code, out) == (2, "")
+    assert "hexafix[study]" in err
+    assert not (tmp_path / "study").exists()
 
 
 def test_the_speed_command_compares_with_a_plain_loop(monkeypatch, capsys):

@@ -29,7 +29,7 @@ def test_no_date_and_no_place_stands_in_a_file(saved):
         assert b"/work" not in content, name
         assert len(content) < 450_000, name
     assert saved["figure-6.png"].startswith(b"\x89PNG")
-    assert saved["figure-6.pdf"].startswith(b"%PDF")
+    assert saved["figure-7.pdf"].startswith(b"%PDF")
 
 
 def test_every_axis_is_named_with_its_unit(drawn):

@@ -103,6 +103,7 @@ class AnglesStudy:
         return {
             "schema_version": 1,
             "study": "angles",
+            "simulated": True,
             "source": "Section 4.3.2, Fig. 6, Fig. 7",
             "settings": {**settings_document(self.settings), "step_deg": self.step_deg},
             "columns": model_words(),

@@ -23,7 +23,7 @@ BEFORE_DEG = ((-7.41, 6.76), (-8.32, 4.54), (-2.43, 3.55))
 MECHANISM_MM, MECHANISM_RAD = 0.0574, float(np.radians(0.0294))
 """Residual error of the calibrated mechanism, taken per axis. Source: Section 5.2."""
 
-VOXEL_MM = 0.7
+VOXEL_MM = 0.8
 """Edge of the cubic voxels; the paper prints no voxel size."""
 
 FRAME_MM = (262.0, 262.0, 290.0)
@@ -31,6 +31,10 @@ FRAME_MM = (262.0, 262.0, 290.0)
 
 STREAK_HU = 100.0
 """Amplitude of the metal's streaks."""
+
+TARGET_MM, TARGET_DEG = (4.0, 4.0, 6.0), 3.0
+"""How far the reduced mechanism stands from straight, (0, 0, 178) mm; else all struts would end
+equally long, and luck would decide how well their scale fits that one length."""
 
 SWEEP_DEG = (0.0, 120.0, 240.0)
 """The paper's even three markers, t = 100 mm, h = 20 mm. Source: Section 4.3.1."""
@@ -190,10 +194,16 @@ def _drawn_spec(rng: np.random.Generator, settings: ExperimentSettings) -> Phant
         limb=False,
         decoys=False,
     )
+    straight = spec.target_pose.position_mm
+    target = Pose.from_xyz_fixed(
+        position_mm=straight + rng.uniform(-1.0, 1.0, 3) * TARGET_MM,
+        angles_rad=np.radians(rng.uniform(-TARGET_DEG, TARGET_DEG, 3)),
+    )
+    spec = replace(spec, target_pose=target)
     bone = bone_in_ring_b(spec)
     low, high = np.array(BEFORE_MM).T
     low_rad, high_rad = np.radians(BEFORE_DEG).T
     displaced = Pose.from_xyz_fixed(
         position_mm=rng.uniform(low, high), angles_rad=rng.uniform(low_rad, high_rad)
     )
-    return replace(spec, mechanism_pose=bone @ displaced @ bone.inverse() @ spec.target_pose)
+    return replace(spec, mechanism_pose=bone @ displaced @ bone.inverse() @ target)

@@ -79,6 +79,7 @@ class NumberStudy:
         return {
             "schema_version": 1,
             "study": "number",
+            "simulated": True,
             "source": "Section 4.3.1, Fig. 5, Eq. (26)",
             "settings": settings_document(self.settings),
             "columns": model_words(),
