@@ -21,6 +21,9 @@ from hexafix.progress import Progress, silent
 
 THICK_SLICES_MM = 2.0
 """Above this the model fit gives the centre, and a warning."""
+FEWEST_SLICES = 2.5
+"""A ball that fewer slices cross than these can be fitted between them in more than one place: in
+5 mm slices one of 10 mm was 0.55 mm off."""
 CLIPPED_SHARE = 0.20
 """Share of clipped voxels in a ball that is warned about."""
 DISAGREEMENT_MM = 0.06
@@ -94,13 +97,14 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
 
 
 def _check_diameter(volume: Volume, diameter: float) -> None:
-    least = 4.0 * float(np.median(volume.spacing_mm))
+    typical, thickest = float(np.median(volume.spacing_mm)), float(volume.spacing_mm.max())
+    least = max(4.0 * typical, FEWEST_SLICES * thickest)
     if not np.isfinite(diameter) or diameter <= 0.0 or diameter < least:
         raise InputError.of(
             "ball-diameter",
             "the ball's diameter is too small for these voxels",
             value=f"{diameter:g} mm",
-            limit=f"at least {least:.2f} mm, four voxels",
+            limit=f"at least {least:.2f} mm: four voxels, {FEWEST_SLICES:g} of the thickest",
             hazard="H15",
             where="ball_diameter_mm",
             next_step="give the diameter in mm, or scan with smaller voxels",
