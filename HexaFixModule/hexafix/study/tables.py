@@ -161,8 +161,9 @@ def verdict_lines(verdicts: Sequence[Verdict]) -> list[str]:
         ours = (verdict.exact, verdict.sampled, verdict.full, verdict.least_squares)
         figures = " / ".join("-" if v is None else f"{v:.3f}" for v in ours)
         lines.append(f"  {verdict.claim} ({verdict.source})")
+        unit = "°" if verdict.unit == "°" else f" {verdict.unit}"
         lines.append(
-            f"    printed {verdict.printed:g} {verdict.unit}, ours {figures}:"
+            f"    printed {verdict.printed:g}{unit}, ours {figures}:"
             f" {verdict.status}; {verdict.words}"
         )
     return lines

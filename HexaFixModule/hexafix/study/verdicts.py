@@ -22,8 +22,8 @@ Figures = tuple[float, float, float, float]
 LITTLE = 1.1
 """An effect of less than a tenth counts as little."""
 
-UNITS = ((1.0, "mm"), (180.0 / np.pi, "°"))
-"""Scale and unit of position and orientation in verdicts."""
+UNITS = ((1.0, " mm"), (180.0 / np.pi, "°"))
+"""Scale and unit, as it stands behind a number, of position and orientation."""
 
 SURE = 3.0
 """Standard errors beyond which a printed figure counts as not reproduced."""
@@ -131,7 +131,7 @@ def _reductions(by_count: dict[int, Estimates]) -> Iterator[Verdict]:
         implied, scale, unit = stated * (1.0 - printed / 100.0), *UNITS[part]
         words = (
             f"printed {printed - ours[0]:+.1f} points from ours, {away}; with Eq. (26) as printed"
-            f" it gives {implied:.3f} {unit} for N = 6, ours {after[0] * scale:.3f} {unit}"
+            f" it gives {implied:.3f}{unit} for N = 6, ours {after[0] * scale:.3f}{unit}"
         )
         claim = f"less volume error of {name}, N = 6 against 3"
         yield Verdict(claim, "Section 4.3.1", "%", printed, *ours, status, words)

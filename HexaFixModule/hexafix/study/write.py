@@ -9,6 +9,9 @@ from pathlib import Path
 from hexafix.errors import InputError
 from hexafix.progress import Progress, silent
 from hexafix.study.angles import AnglesStudy
+from hexafix.study.experiment import ExperimentStudy
+from hexafix.study.experiment_figure import experiment_figure
+from hexafix.study.experiment_tables import experiment_page
 from hexafix.study.figures import figure_5, figure_6, figure_7
 from hexafix.study.number import NumberStudy
 from hexafix.study.plotting import save
@@ -40,6 +43,14 @@ def write_angles(
     }
     figures = {"figure-6": lambda: figure_6(study), "figure-7": lambda: figure_7(study)}
     return _written(folder, texts, figures, progress)
+
+
+def write_experiment(
+    study: ExperimentStudy, folder: Path, *, progress: Progress = silent
+) -> tuple[Path, ...]:
+    """Write figure, page and JSON of the simulated experiment; return their paths."""
+    texts = {"experiment.md": experiment_page(study), "experiment.json": _json(study.as_json())}
+    return _written(folder, texts, {"experiment": lambda: experiment_figure(study)}, progress)
 
 
 def _json(document: object) -> str:
