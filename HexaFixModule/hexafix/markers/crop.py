@@ -16,6 +16,10 @@ MOVED_MM = 1e-4
 """A slice that lies farther aside of the one before it was moved between its voxels."""
 
 
+LONE_VOXELS = 3
+"""So few voxels at the greatest value of a crop are noise, not the scanner's ceiling."""
+
+
 @dataclass(frozen=True, eq=False)
 class Crop:
     """A small box of a volume.
@@ -74,7 +78,8 @@ class Crop:
         Returns
         -------
         tuple of float
-            Median, robust standard deviation, share at the crop's greatest value, 5th percentile.
+            Median, robust standard deviation, share clipped at the crop's greatest value, 5th
+            percentile.
         """
         index = self.volume.ijk_from_lps(center_mm + reach_mm * _BALL) - self.first_ijk
         index = np.rint(index).astype(int)
@@ -82,7 +87,9 @@ class Crop:
         values = self.voxels[index[:, 2], index[:, 1], index[:, 0]]
         middle = float(np.median(values))
         noise = 1.4826 * float(np.median(np.abs(values - middle)))
-        clipped = float(np.mean(values >= self.brightest))
+        # A scanner's ceiling is met by many voxels; of a noisy core's voxels one is the brightest.
+        ceiling = np.count_nonzero(self.voxels == self.brightest) > LONE_VOXELS
+        clipped = float(np.mean(values >= self.brightest)) if ceiling else 0.0
         return middle, noise, clipped, float(np.quantile(values, 0.05))
 
     def clipped(self, clip_hu: float) -> NDArray[np.bool_]:
