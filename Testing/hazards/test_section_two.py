@@ -198,7 +198,7 @@ def test_a_frame_adjusted_after_the_scan_is_refused(measured):
     later = frame.mechanism @ turned(1.5, "y", (0.0, 0.0, 3.0))
     lengths = strut_lengths(later, measured.read(document).fixator)
     document["strut_readings_mm"] = lengths.tolist()
-    assert hazards(measured.verdict(document, frame.balls_mm())) & {"H24", "H33"}
+    assert ("H24", "strut-reading") in measured.verdict(document, frame.balls_mm())
 
 
 @pytest.mark.parametrize(
