@@ -75,6 +75,29 @@ def angles(
 
 
 @study.command
+def experiment(
+    *,
+    poses: Annotated[int, Parameter(help="Poses with a rendered CT.")] = 10,
+    drawn: Annotated[int, Parameter(help="Poses of the larger run without CT.")] = 200,
+    seed: Seed = 1,
+    voxel_mm: Annotated[float, Parameter(help="Edge of the CT's voxels.")] = 0.8,
+    jobs: Annotated[int | None, Parameter(help="Poses at once; none means all cores.")] = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Tables 1 and 2 re-enacted on simulated CT: Section 5.2, with an error budget."""
+    from hexafix.study.experiment import study_experiment
+    from hexafix.study.experiment_tables import experiment_text
+    from hexafix.study.experiment_trial import ExperimentSettings
+    from hexafix.study.write import write_experiment
+
+    settings = ExperimentSettings(poses=poses, drawn=drawn, seed=seed, voxel_mm=voxel_mm, jobs=jobs)
+    return _run(study_experiment, experiment_text, write_experiment, settings, out, None, json,
+                quiet)  # fmt: skip
+
+
+@study.command
 def speed(*, workers: Workers = None, json: Json = False) -> int:
     """The sweep of all layouts measured against a plain loop, and its memory."""
     from hexafix.study.speed import sweep_speed

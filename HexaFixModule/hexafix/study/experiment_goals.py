@@ -142,9 +142,9 @@ class Goal:
     bound: str
 
     @property
-    def met(self) -> bool:
-        """Whether both runs keep the limit."""
-        return self.rendered <= self.limit and self.drawn <= self.limit
+    def met(self) -> dict[str, bool]:
+        """Whether each run keeps the limit."""
+        return {"rendered": self.rendered <= self.limit, "drawn": self.drawn <= self.limit}
 
     def as_json(self) -> dict[str, Any]:
         """By name."""
@@ -226,8 +226,8 @@ def _bounds(run: Run, quantity: str, way: Way) -> tuple[str, str]:
     """The largest source for position and for orientation, in words."""
     budget = next(b for b in budgets(run) if b.name == quantity and b.way == way)
     words = []
-    for k, unit in enumerate(("mm", "°")):
+    for k, unit in enumerate((" mm", "°")):
         name, share = max(budget.shares.items(), key=lambda item: item[1][k])
         part = budget.alone[name][k]
-        words.append(f"{name} alone {part:.3f} {unit}, {share[k]:.0%} of the squares")
+        words.append(f"{name} alone {part:.3f}{unit}, {share[k]:.0%} of the squares")
     return words[0], words[1]

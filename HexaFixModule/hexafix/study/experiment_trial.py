@@ -12,7 +12,7 @@ from hexafix.geometry import Pose
 from hexafix.hardware import MarkerLayout
 from hexafix.phantom import PhantomSpec
 from hexafix.phantom.make import check_buildable
-from hexafix.phantom.scene import bone_in_ring_b, build_scene
+from hexafix.phantom.scene import Scene, bone_in_ring_b, build_scene
 
 Array = NDArray[np.float64]
 
@@ -144,16 +144,7 @@ def draw_trial(settings: ExperimentSettings, number: int, *, rendered: bool) -> 
     Every pose has its own random stream, so that the order of work changes nothing.
     """
     rng = np.random.default_rng([settings.seed, number, 5 if rendered else 6])
-    for attempt in range(TRIES):
-        spec = _drawn_spec(rng, settings)
-        scene = build_scene(spec)
-        try:
-            check_buildable(spec, scene)
-        except InputError:
-            if attempt == TRIES - 1:
-                raise
-            continue
-        break
+    spec, scene = _buildable(rng, settings)
     rings = (scene.ring_a, scene.ring_b)
     true = np.array(list(scene.balls_mm.values())).reshape(2, 4, 3)
     places = np.array([spec.proximal.points_mm, spec.distal.points_mm])
@@ -168,6 +159,22 @@ def draw_trial(settings: ExperimentSettings, number: int, *, rendered: bool) -> 
         mechanism_twists=rng.normal(size=(2, 6)) * sigma,
         image_z=rng.normal(size=(2, 4, 3)),
     )
+
+
+def _buildable(rng: np.random.Generator, settings: ExperimentSettings) -> tuple[PhantomSpec, Scene]:
+    """The first drawn frame whose struts reach and whose balls are free and in the scan."""
+    attempt = 0
+    while True:
+        spec = _drawn_spec(rng, settings)
+        scene = build_scene(spec)
+        attempt += 1
+        try:
+            check_buildable(spec, scene)
+        except InputError:
+            if attempt == TRIES:
+                raise
+            continue
+        return spec, scene
 
 
 def _drawn_spec(rng: np.random.Generator, settings: ExperimentSettings) -> PhantomSpec:
