@@ -21,7 +21,7 @@ DOCUMENT = Path("Resources/Documents/hazards.md")
 STATUS = ("tested", "partly", "not built")
 CODE = re.compile(r"[a-z*][a-z0-9*]*(-[a-z0-9*]+)*")
 HAZARD = re.compile(r"H[0-5][0-9]")
-NO_PLAN = ("benchmark", "phantom", "scenarios", "study")
+NO_PLAN = ("benchmark", "comparison", "phantom", "scenarios", "study")
 """Rooms that make synthetic data or measure: no patient's plan passes through their faults."""
 _CODE_ARGUMENT = {"Fault": 0, "of": 0, "fault": 0, "_fault": 0, "Gate": 1, "at_most": 1}
 
