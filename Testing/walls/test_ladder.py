@@ -36,14 +36,15 @@ LADDER = {
     "benchmark": 11,
     "scenarios": 11,
     "study": 12,
-    "cli": 13,
-    "__main__": 14,
+    "comparison": 13,
+    "cli": 14,
+    "__main__": 15,
 }
 """Each room's level: a room may import rooms of lower levels only."""
 
 SIDEWAYS_OR_DOORS = {"vtk", "vtkmodules", "pyvista", "slicer", "qt", "ctk", "qtpy", "PySide6",
                      "trame", "trame_slicer", "matplotlib", "skimage", "joblib",
-                     "distributed"}  # fmt: skip
+                     "distributed", "cc3d"}  # fmt: skip
 """Optional libraries: never imported at a module's top level."""
 
 LIBRARIES = {
@@ -72,7 +73,9 @@ LIBRARIES = {
     "cli": {"cyclopts", "rich"},
     "study": {"numpy", "matplotlib", "joblib", "distributed"},
     "scenarios": {"numpy", "pydicom"},
-    "benchmark": {"numpy", "scipy", "pydicom", "SimpleITK", "skimage", "vtkmodules", "psutil"},
+    "benchmark": {"numpy", "scipy", "pydicom", "SimpleITK", "skimage", "vtkmodules", "psutil"}
+    | {"cc3d"},
+    "comparison": set(),
 }
 """What each room may use besides the standard library, anywhere in its files."""
 

@@ -132,7 +132,7 @@ def isosurface_center(
     vertices = marching_cubes(values, level)[0]
     points = volume.lps_from_ijk(vertices[:, ::-1])
     points = points[np.linalg.norm(points - near_mm, axis=1) < 0.75 * diameter_mm]
-    return _least_squares_sphere(points)
+    return least_squares_sphere(points)
 
 
 def isosurface_finder() -> Any:
@@ -154,7 +154,7 @@ def isosurface_finder() -> Any:
     return marching_cubes
 
 
-def _least_squares_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def least_squares_sphere(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Centre of the algebraic least squares sphere of points, shape (n, 3)."""
     middle = points.mean(axis=0)
     local = points - middle
@@ -323,7 +323,7 @@ def simpleitk_pipeline(
         low, high = np.maximum(box[:3] - 4, 0), box[:3] + box[3:] + 4
         crop = volume.voxels[low[2] : high[2], low[1] : high[1], low[0] : high[0]]
         vertices = marching_cubes(crop.astype(np.float32), 650.0)[0]
-        centers.append(_least_squares_sphere(volume.lps_from_ijk(vertices[:, ::-1] + low)))
+        centers.append(least_squares_sphere(volume.lps_from_ijk(vertices[:, ::-1] + low)))
     return time.perf_counter() - start, centers
 
 

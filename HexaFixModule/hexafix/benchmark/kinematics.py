@@ -49,7 +49,7 @@ def speed(
         ``single_us``, ``batch_us``, ``least_squares_us``, ``single_ratio`` and ``batch_ratio``
         (against `scipy.optimize.least_squares`), ``iterations_mean``, ``passed``.
     """
-    rotations, positions = _random_poses(batch, seed)
+    rotations, positions = random_poses(batch, seed)
     lengths = strut_lengths_batch(rotations=rotations, positions_mm=positions, fixator=fixator)
     neutral = Pose(np.eye(3), np.array([0.0, 0.0, HEIGHT_MM]))
 
@@ -94,7 +94,7 @@ def round_trip(fixator: Fixator, *, poses: int = 10_000, seed: int = 1) -> dict[
         ``position_mm`` and ``rotation_rad`` in a batch, ``single_mm`` one by one over a
         hundredth of the poses, ``limit_mm``, ``passed``.
     """
-    rotations, positions = _random_poses(poses, seed)
+    rotations, positions = random_poses(poses, seed)
     lengths = strut_lengths_batch(rotations=rotations, positions_mm=positions, fixator=fixator)
     neutral = Pose(np.eye(3), np.array([0.0, 0.0, HEIGHT_MM]))
     found = forward_kinematics_batch(
@@ -118,7 +118,7 @@ def round_trip(fixator: Fixator, *, poses: int = 10_000, seed: int = 1) -> dict[
     }
 
 
-def _random_poses(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def random_poses(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Rotations (count, 3, 3) and positions (count, 3), mm, about the neutral pose."""
     rng = np.random.default_rng(seed)
     angles = np.radians(rng.uniform(-TURN_DEG, TURN_DEG, (count, 3)))

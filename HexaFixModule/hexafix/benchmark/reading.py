@@ -37,7 +37,7 @@ def reading_time(
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_dicom_series(_noise(size_ijk, seed), folder, identity="reading")
+        write_dicom_series(noise_volume(size_ijk, seed), folder, identity="reading")
         readers: dict[str, Callable[[], object]] = {
             "hexafix_s": lambda: read_volume(folder),
             "simpleitk_s": lambda: simpleitk_series(folder),
@@ -70,7 +70,8 @@ def _pydicom_series(folder: Path) -> object:
     return np.stack([item.pixel_array for item in slices])
 
 
-def _noise(size_ijk: tuple[int, int, int], seed: int) -> Volume:
+def noise_volume(size_ijk: tuple[int, int, int], seed: int) -> Volume:
+    """A volume of random HU, voxels 0.7 × 0.7 × 0.625 mm."""
     rng = np.random.default_rng(seed)
     i, j, k = size_ijk
     voxels = rng.integers(-1024, 3071, (k, j, i), np.int16)

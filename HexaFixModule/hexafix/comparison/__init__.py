@@ -1,0 +1,1 @@
+"""The benchmark page: what `hexafix.benchmark.comparison` measured, as text and picture."""
