@@ -303,11 +303,20 @@ def selftest(*, json: Json = False) -> int:
 def benchmark(
     *names: Annotated[str, Parameter(help="Which measurements; none means all.")],
     quick: Annotated[bool, Parameter(negative="", help="Small samples, for a first look.")] = False,
+    page: Annotated[
+        Path | None, Parameter(help="Compare with other tools, page and picture into this folder.")
+    ] = None,
+    seed: Annotated[int, Parameter(help="Of the page: same seed, same data.")] = 0,
     json: Json = False,
+    quiet: Quiet = False,
 ) -> int:
-    """Measure HexaFix against its goals and against what one would otherwise write."""
+    """Measure HexaFix against its goals, or with --page against what one would otherwise write."""
     from hexafix.benchmark.run import print_rows, run
 
+    if page is not None:
+        from hexafix.cli.benchmark_page import make_page
+
+        return make_page(names, page, quick=quick, seed=seed, json=json, quiet=quiet)
     rows = run(names, quick=quick)
     print_json(rows) if json else print_rows(rows)
     return 0 if all(row["met"] for row in rows) else 1
