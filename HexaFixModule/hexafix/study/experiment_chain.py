@@ -113,11 +113,11 @@ def ways_of(road: Road, *modes: Mode) -> tuple[Way, ...]:
 WAYS = (
     *ways_of(PAPER, "none", "additive"),
     *ways_of(OURS, "none", "additive", "fused", "calibrated"),
-    *ways_of(FOUR, "fused", "calibrated"),
+    *ways_of(FOUR, "calibrated"),
 )
 """What Table 2 is made for."""
 
-BUDGET_WAYS = (*ways_of(PAPER, "additive"), *ways_of(OURS, "fused", "calibrated"))
+BUDGET_WAYS = (*ways_of(PAPER, "additive"), *ways_of(OURS, "calibrated"))
 """What the error budget is made for."""
 
 

@@ -13,8 +13,15 @@ from hexafix.phantom.spec import INSTALLATION_SIGMA_MM
 from hexafix.study import experiment_statistics as statistics
 from hexafix.study.experiment import ExperimentStudy, Run
 from hexafix.study.experiment_chain import HAND_MM, MOTOR_MM, ROADS, WAYS, Road, Way
+from hexafix.study.experiment_floor import floor_document
 from hexafix.study.experiment_goals import budgets, goals, way_document
-from hexafix.study.experiment_trial import MECHANISM_MM, MECHANISM_RAD, STREAK_HU
+from hexafix.study.experiment_trial import (
+    BEFORE_MM,
+    MECHANISM_MM,
+    MECHANISM_RAD,
+    REDUCED_MM,
+    STREAK_HU,
+)
 
 NOT_SIMULATED = (
     "the bones are planned without error in the image",
@@ -41,6 +48,7 @@ def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
             }
             for fit, error in study.image.items()
         },
+        "installation_floor": floor_document(),
         "printed": {
             "table_1": asdict(statistics.TABLE_1),
             "table_2_before": asdict(statistics.TABLE_2_BEFORE),
@@ -63,6 +71,8 @@ def settings_document(study: ExperimentStudy) -> dict[str, Any]:
         "drawn": settings.drawn,
         "seed": settings.seed,
         "voxel_mm": settings.voxel_mm,
+        "reduced_ring_distance_mm": REDUCED_MM,
+        "ct_ring_distance_mm": REDUCED_MM + float(np.mean(BEFORE_MM[2])),
         "psf_sigma_mm": scan.psf_sigma_mm,
         "noise_hu": scan.noise_hu,
         "streak_hu": STREAK_HU,

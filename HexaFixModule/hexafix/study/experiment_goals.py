@@ -99,7 +99,7 @@ def budgets(run: Run) -> list[Budget]:
     found = []
     for name, quantity, ways in (
         ("recognised", lambda way, source: run.recognised(way.road, source),
-         [w for w in BUDGET_WAYS if w.scale_mm == MOTOR_MM and w.mode in ("additive", "fused")]),
+         [way for way in BUDGET_WAYS if way.scale_mm == MOTOR_MM]),
         ("compensated", run.compensated, BUDGET_WAYS),
         ("after", run.after, BUDGET_WAYS),
     ):  # fmt: skip
@@ -186,7 +186,7 @@ def _volume_goals(
         return run.recognised(OURS) if way is None else run.compensated(way)
 
     both = of(study.rendered), of(study.drawn)
-    bound = _bounds(study.drawn, quantity, way or Way(OURS, "fused", MOTOR_MM))
+    bound = _bounds(study.drawn, quantity, way or Way(OURS, "calibrated", MOTOR_MM))
     return [
         Goal(
             f"{name}, mean volume error", unit, limits[k],
