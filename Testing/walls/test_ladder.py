@@ -75,7 +75,7 @@ LIBRARIES = {
     "scenarios": {"numpy", "pydicom"},
     "benchmark": {"numpy", "scipy", "pydicom", "SimpleITK", "skimage", "vtkmodules", "psutil"}
     | {"cc3d"},
-    "comparison": set(),
+    "comparison": {"matplotlib"},
 }
 """What each room may use besides the standard library, anywhere in its files."""
 

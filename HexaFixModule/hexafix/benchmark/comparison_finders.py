@@ -30,7 +30,7 @@ def by_hexafix(volume: Volume, diameter_mm: float) -> Array:
 
 def by_careless_hexafix(volume: Volume, diameter_mm: float) -> Array:
     """A control: the work done twice beside a copy in double precision, rounded to the voxel."""
-    wide = np.asarray(volume.voxels, np.float64).copy()
+    wide = volume.voxels.astype(np.float64)
     by_hexafix(volume, diameter_mm)
     centers = by_hexafix(volume, diameter_mm)
     index = np.rint(volume.ijk_from_lps(centers)) if len(centers) else centers

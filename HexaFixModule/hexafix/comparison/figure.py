@@ -40,7 +40,7 @@ def draw(document: Document) -> Any:
     groups = {group["name"]: group for group in document["groups"]}
     balls = groups.pop("balls", None)
     with drawing():
-        heights = ([len(balls["tools"]) + 2.5] if balls else []) + ([7.0] if groups else [])
+        heights = ([len(balls["tools"]) + 2.5] if balls else []) + ([8.0] if groups else [])
         figure = new_figure(9.6, 0.34 * sum(heights) + 0.4)
         rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         if balls:
@@ -48,7 +48,8 @@ def draw(document: Document) -> Any:
         if groups:
             axes = rows[-1].subplots(1, len(groups), squeeze=False)[0]
             for axis, group in zip(axes, groups.values(), strict=True):
-                _times(axis, group["tools"], title=group["title"])
+                _times(axis, group["tools"])
+                axis.set_title(f"{group['title']}:\ntime over HexaFix's", loc="left")
                 _name_tools(axis, group["tools"])
         return settle(figure)
 
@@ -73,10 +74,11 @@ def _finders(figure: Any, group: Document) -> None:
             label=quality,
         )
     errors.set_xscale("log")
+    _plain_numbers(errors)
     errors.set_title("3D RMS error of a ball's centre, mm", loc="left")
     errors.grid(axis="x", which="major")
     errors.legend(loc="lower left", ncols=1, title="image")
-    _times(times, tools, title=group["title"])
+    _times(times, tools)
     times.set_title("Time over HexaFix's", loc="left")
     told = [
         (row["peak_mb"], place) for place, row in enumerate(tools) if row["peak_mb"] is not None
@@ -93,7 +95,7 @@ def _finders(figure: Any, group: Document) -> None:
         axis.tick_params(axis="y", length=0)
 
 
-def _times(axis: Any, tools: list[Document], *, title: str) -> None:
+def _times(axis: Any, tools: list[Document]) -> None:
     """Median and range of the paired ratios, each with its number."""
     axis.axvline(1.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
     for place, row in enumerate(tools):
@@ -104,22 +106,36 @@ def _times(axis: Any, tools: list[Document], *, title: str) -> None:
         axis.annotate(
             f"{row['ratio']:.2g}×",
             (row["ratio"], place),
-            (0, 4),
+            (0, 6),
             textcoords="offset points",
             ha="center",
             fontsize=7,
+            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
         )
     axis.set_xscale("log")
     axis.margins(x=0.12)
+    _plain_numbers(axis)
     axis.grid(axis="x", which="major")
-    axis.set_title(f"{title}: time", loc="left")
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Ticks as 0.1, 1, 10 and not as powers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=8))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _name_tools(axis: Any, tools: list[Document]) -> None:
     """The tools' names down the side, the first on top."""
-    axis.set_yticks(range(len(tools)), [row["name"] for row in tools])
+    axis.set_yticks(range(len(tools)), [_label(row) for row in tools])
     axis.set_ylim(len(tools) - 0.4, -0.7)
     axis.tick_params(axis="y", length=0)
+
+
+def _label(row: Document) -> str:
+    return f"control: {row['name']}" if row["control"] else row["name"]
 
 
 def _colour(row: Document) -> str:

@@ -175,7 +175,7 @@ def _accuracy_cells(group: Document) -> list[list[str]]:
     cells = [["tool", *(heading for _, _, heading in columns)]]
     for row in group["tools"]:
         cases = {case["case"]: case for case in row["accuracy"]}
-        cells.append([row["words"], *(_number(cases[case][key]) for case, key, _ in columns)])
+        cells.append([row["words"], *(_error(cases[case][key]) for case, key, _ in columns)])
     return cells
 
 
@@ -190,6 +190,13 @@ def _number(value: Any) -> str:
     if 0.0 < abs(value) < 1e-4:
         return f"{value:.1e}"
     return f"{value:.3g}" if abs(value) < 100 else f"{value:.0f}"
+
+
+def _error(value: Any) -> str:
+    """An error in mm or degrees to four decimals; what is smaller by its power of ten."""
+    if isinstance(value, float) and (abs(value) >= 1e-6 or value == 0.0):
+        return f"{value:.4f}" if value else "0"
+    return _number(value)
 
 
 def _verdict(row: Document, group: Document) -> list[str]:
@@ -213,20 +220,23 @@ def _verdict(row: Document, group: Document) -> list[str]:
 
 def _accuracy_verdicts(row: Document, ours: Document) -> tuple[list[str], list[str]]:
     """Errors that are smaller than HexaFix's, and those that are equal."""
-    better, equal = [], []
+    better: dict[str, list[str]] = {}
+    equal: dict[str, list[str]] = {}
     for theirs, mine in zip(row["accuracy"], ours["accuracy"], strict=True):
         for key in sorted(JUDGED & set(theirs)):
             if None in (theirs[key], mine[key]):
                 continue
             floor = next((v for end, v in NO_ERROR.items() if key.endswith(end)), 0.0)
-            name = f"{ERROR_WORDS[key]}, {theirs['case']}"
-            if max(theirs[key], mine[key]) <= floor or (
-                abs(theirs[key] - mine[key]) <= EQUAL_SHARE * mine[key]
-            ):
-                equal.append(name)
+            none = max(theirs[key], mine[key]) <= floor
+            if none or abs(theirs[key] - mine[key]) <= EQUAL_SHARE * mine[key]:
+                equal.setdefault(ERROR_WORDS[key], []).append(theirs["case"])
             elif theirs[key] < mine[key]:
-                better.append(name)
-    return better, equal
+                better.setdefault(ERROR_WORDS[key], []).append(theirs["case"])
+    return _listed(better), _listed(equal)
+
+
+def _listed(cases: dict[str, list[str]]) -> list[str]:
+    return [f"{words} ({', '.join(names)})" for words, names in cases.items()]
 
 
 ERROR_WORDS = {
@@ -245,7 +255,7 @@ def _controls(controls: Sequence[Document]) -> list[str]:
     """What came of the tool made worse on purpose."""
     if not controls:
         return ["No control ran.", ""]
-    cells = [["a HexaFix made careless on purpose", "measured", "must be at least", "told apart"]]
+    cells = [["a HexaFix made careless on purpose", "measured", "must reach", "told apart"]]
     for row in controls:
         unit = f" {row['unit']}"
         cells.append([row["name"], _number(row["value"]) + unit, _number(row["at_least"]) + unit,
