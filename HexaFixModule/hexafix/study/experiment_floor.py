@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ SHARP_MM2 = 1e-12
 """Covariance of a ball centre without image error."""
 
 
+@cache
 def installation_floor(distance_mm: float) -> tuple[float, float]:
     """Mean volume errors of the mechanism's pose, straight rings, mm and radians.
 
