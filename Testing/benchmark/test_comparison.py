@@ -1,7 +1,10 @@
 """A quick slice of the comparison with other tools: its document, its page, and its power."""
 
 import json
+import os
 import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +118,15 @@ def test_an_unknown_comparison_is_refused():
     with pytest.raises(InputError) as caught:
         compare(("nothing",))
     assert caught.value.faults[0].code == "benchmark-unknown"
+
+
+def test_the_command_line_refuses_an_unknown_comparison_and_writes_nothing(tmp_path):
+    command = [sys.executable, "-m", "hexafix", "benchmark", "nothing", "--page", tmp_path / "page"]
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    run = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert "benchmark-unknown" in run.stderr or "no such comparison" in run.stderr
+    assert not (tmp_path / "page").exists()
 
 
 def test_the_page_says_where_another_tool_is_better(a_document):
