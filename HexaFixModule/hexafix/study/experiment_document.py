@@ -45,6 +45,7 @@ def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
                 "bias_mm": error.bias_mm.tolist(),
                 "deviation_mm": np.sqrt(np.diag(error.covariance_mm2)).tolist(),
                 "rms_3d_mm": error.rms_mm,
+                "worst_3d_mm": error.worst_mm,
             }
             for fit, error in study.image.items()
         },

@@ -103,12 +103,15 @@ class ImageError:
     stated_mm2 : ndarray, shape (3, 3), or None
         Mean of the covariances that the fit states.
     balls : int
+    worst_mm : float
+        Largest 3D error.
     """
 
     bias_mm: Array
     covariance_mm2: Array
     stated_mm2: Array | None
     balls: int
+    worst_mm: float
 
     @property
     def rms_mm(self) -> float:
@@ -133,5 +136,6 @@ def measured(scans: list[dict[str, Seen]]) -> dict[str, ImageError]:
         known = [part.reshape(-1, 3, 3) for part in stated if part is not None]
         # the rings stand almost upright in LPS and the stated covariances are almost round
         mean = np.concatenate(known).mean(axis=0) if known else None
-        found[fit] = ImageError(errors.mean(axis=0), np.cov(errors.T), mean, len(errors))
+        worst = float(np.linalg.norm(errors, axis=1).max())
+        found[fit] = ImageError(errors.mean(axis=0), np.cov(errors.T), mean, len(errors), worst)
     return found

@@ -220,7 +220,8 @@ def experiment_heading(study: ExperimentStudy) -> list[str]:
     s = settings_document(study)
     floor = installation_floor(s["ct_ring_distance_mm"])
     errors = "; ".join(
-        f"{FIT_WORDS[fit]} {error.rms_mm:.4f} mm ({error.bias_mm[2]:+.4f} mm along the rod)"
+        f"{FIT_WORDS[fit]} {error.rms_mm:.4f} mm (worst {error.worst_mm:.3f}, mean along the"
+        f" rod {error.bias_mm[2]:+.4f} mm)"
         for fit, error in study.image.items()
     )
     return [
