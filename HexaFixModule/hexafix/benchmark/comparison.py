@@ -180,7 +180,7 @@ def _more_balls(
     names: Sequence[str], data: Document, *, quick: bool, seed: int
 ) -> dict[str, list[Document]]:
     """Centre errors over placements and balls missed in other phantoms; counts go into `data`."""
-    data["placements"], data["phantoms"] = (6, 0) if quick else (40, 2)
+    data["placements"], data["phantoms"] = (4, 0) if quick else (40, 2)
     rows = comparison_balls.centre_errors(names, placements=data["placements"], seed=seed)
     other = comparison_balls.searched(names, phantoms=data["phantoms"], seed=seed)
     return {name: rows[name] + other[name] for name in names}

@@ -105,7 +105,8 @@ def page(document: Document) -> str:
         "",
         "Times are over those of the HexaFix tool that does the same work and ran just before:"
         " median of the pairs and their range. HexaFix's own rows show it against itself: what"
-        " chance and warm caches do. Processor time counts all threads and suffers less from other programs.",
+        " chance and warm caches do. Processor time counts all threads and suffers less from other"
+        " programs.",
         "",
     ]
     for group in document["groups"]:
