@@ -6,6 +6,7 @@ import inspect
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -48,8 +49,13 @@ def resolved(name):
     raise AttributeError(name)
 
 
-def cited():
-    """Pairs of equation and name, from the live docstrings and not from the maker's parser."""
+@cache
+def cited(*, departing=False):
+    """Pairs of equation and name, from the live docstrings and not from the maker's parser.
+
+    With `departing` only of docstrings that tell of a departure.
+    """
+    pairs = []
     for path in sorted(PACKAGE.rglob("*.py")):
         if "Source:" not in path.read_text(encoding="utf-8"):
             continue
@@ -67,7 +73,9 @@ def cited():
                     text = part.split("Departs:")[0].split("\n\n")[0]
                     for first, last in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", text):
                         for equation in range(int(first), int(last or first) + 1):
-                            yield equation, f"{short}.{own}"
+                            if not departing or "Departs:" in thing.__doc__:
+                                pairs.append((equation, f"{short}.{own}"))
+    return pairs
 
 
 def faults(page):
@@ -110,6 +118,58 @@ def test_the_docstrings_tell_of_many_equations():
 
 def test_the_map_is_what_its_command_makes(make):
     assert make.equations_page() == the_map()
+
+
+def test_every_equation_from_which_a_docstring_departs_has_a_measured_departure():
+    page = (DOCUMENTS / "method-departures.md").read_text(encoding="utf-8")
+    told = set()
+    for place in re.findall(r"^\| (Eq\. [^|]*) \|", page, re.MULTILINE):
+        for first, last in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", place):
+            told |= set(range(int(first), int(last or first) + 1))
+    departing = {equation for equation, _ in cited(departing=True)}
+    assert {3, 9, 14, 15, 19, 32} <= departing
+    assert departing <= told
+
+
+@pytest.mark.parametrize("markers", [3, 4, 7])
+def test_without_a_misprint_the_printed_steps_are_exact(markers):
+    from hexafix.study.as_printed import printed_ring_pose
+    from hexafix.study.departures import PLACED, even
+
+    layout = even(markers)
+    found = printed_ring_pose(PLACED.apply(layout.points_mm), layout, printed=0)
+    assert found.difference(PLACED) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+LEANS = {
+    "varus": (0, -1), "valgus": (0, 1), "medial": (0, -1), "lateral": (0, 1),
+    "apex-anterior": (1, 1), "apex-posterior": (1, -1), "anterior": (1, -1), "posterior": (1, 1),
+    "short": (2, 1), "long": (2, -1),
+}  # fmt: skip
+"""Where the far end of a left limb's distal fragment goes, axis of LPS and sign, by the page."""
+
+
+def test_the_drawn_words_move_the_fragment_as_the_page_says():
+    import numpy as np
+    from hexafix.correction import Deformity
+    from hexafix.study.conventions import PANELS
+
+    drawn = {}
+    for _, values in PANELS:
+        deformity = Deformity(moving="distal", origin_lps_mm=np.zeros(3), **values)
+        word = next(value for value in values.values() if isinstance(value, str))
+        drawn[word] = deformity.displacement(side="left")
+    far = np.array([0.0, 0.0, -100.0])
+    for word, (axis, sign) in LEANS.items():
+        moved = drawn.pop(word).apply(far) - far
+        assert np.argmax(np.abs(moved)) == axis, word
+        assert np.sign(moved[axis]) == sign, word
+    front = np.array([0.0, -30.0, 0.0])
+    assert drawn.pop("internal").apply(front)[0] < -1.0
+    assert drawn.pop("external").apply(front)[0] > 1.0
+    assert not drawn
+    page = (DOCUMENTS / "method.md").read_text(encoding="utf-8")
+    assert all(f"`{word}`" in page for word in [*LEANS, "internal", "external"])
 
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e-\d+)?")

@@ -160,8 +160,8 @@ def _space(canvas: Canvas) -> None:
     _ring(canvas, view, MECHANISM, ring.thickness_mm, ring.outer_radius_mm)
     for end in head:
         canvas.circle(end, 1.0, fill=PAPER, stroke=INK, stroke_width=0.4)
-    _markers(canvas, view, MECHANISM, PROXIMAL)
     _triad(canvas, view, MECHANISM, 62.0, "{A}", ("x", "y", "z"), (-6.5, -1.0))
+    _markers(canvas, view, MECHANISM, PROXIMAL)
     corner = _View((21.0, 128.0), 0.36, 38.0, 24.0)
     _triad(canvas, corner, Pose(IMAGE.rotation, np.zeros(3)), 40.0, "{W}",
            ("x = L", "y = P", "z = S"), (-6.0, -2.0))  # fmt: skip

@@ -236,7 +236,7 @@ def groups_or_all() -> list[Departure]:
     ]
     return [
         Departure(
-            "Eq. (8)-(19)",
+            "Eq. (6)-(19)",
             f"mean of groups of three, N = {count}",
             f"volume error {words(*map(float, volume_error(group_covariance(even(count)))))}",
             "one least-squares fit of all markers, weighted by their covariances",
