@@ -118,7 +118,7 @@ def departures_page() -> str:
         f"Made by `{COMMAND} departures` (seed {SEED}, simulated; each error that a single case",
         "shows is free of noise). *Exact*: both methods of HexaFix give the pose to 10⁻⁹ mm and",
         f"rad. The rows of Eq. (31), (32) are means of {CASES} corrections each;",
-        "`hexafix benchmark compensation` makes them of 400.",
+        "`hexafix benchmark compensation` makes them of 2500.",
         "",
         "| place | as printed | what it costs | HexaFix | with it |",
         "|---|---|---|---|---|",
