@@ -104,7 +104,11 @@ def _situation(
 
 
 def isosurface_center(
-    volume: Volume, *, near_mm: NDArray[np.float64], diameter_mm: float
+    volume: Volume,
+    *,
+    near_mm: NDArray[np.float64],
+    diameter_mm: float,
+    level_hu: float | None = None,
 ) -> NDArray[np.float64]:
     """Centre by isosurface at half height and least squares, the paper's recipe.
 
@@ -115,6 +119,8 @@ def isosurface_center(
     near_mm : ndarray, shape (3,)
         A point inside the ball, LPS mm: it only picks the ball's surface out of the crop.
     diameter_mm : float
+    level_hu : float, optional
+        The isosurface; None: half-way between air and the value at `near_mm`.
 
     Returns
     -------
@@ -127,9 +133,10 @@ def isosurface_center(
     """
     marching_cubes = isosurface_finder()
     values = np.asarray(volume.voxels, np.float32)
-    place = np.rint(volume.ijk_from_lps(near_mm)).astype(int)
-    level = 0.5 * (float(values[place[2], place[1], place[0]]) - 1000.0)
-    vertices = marching_cubes(values, level)[0]
+    if level_hu is None:
+        place = np.rint(volume.ijk_from_lps(near_mm)).astype(int)
+        level_hu = 0.5 * (float(values[place[2], place[1], place[0]]) - 1000.0)
+    vertices = marching_cubes(values, level_hu)[0]
     points = volume.lps_from_ijk(vertices[:, ::-1])
     points = points[np.linalg.norm(points - near_mm, axis=1) < 0.75 * diameter_mm]
     return least_squares_sphere(points)

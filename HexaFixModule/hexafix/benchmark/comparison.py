@@ -20,7 +20,7 @@ from hexafix.benchmark import (
     comparison_reading,
 )
 from hexafix.benchmark.comparison_race import Raced, Tool, race
-from hexafix.errors import InputError
+from hexafix.benchmark.run import require_known
 from hexafix.libraries import version_of
 from hexafix.progress import Progress, silent
 
@@ -81,14 +81,7 @@ def compare(
     InputError
         If a name is unknown.
     """
-    unknown = sorted(set(names) - set(GROUPS))
-    if unknown:
-        raise InputError.of(
-            "benchmark-unknown",
-            "there is no such comparison",
-            value=", ".join(unknown),
-            limit=", ".join(GROUPS),
-        )
+    require_known(names, GROUPS, what="comparison")
     load = _load()
     groups = [
         _group(name, quick=quick, seed=seed, only=only, progress=progress)

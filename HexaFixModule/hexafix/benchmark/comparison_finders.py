@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.benchmark.balls import least_squares_sphere
+from hexafix.benchmark.balls import isosurface_center, least_squares_sphere
 from hexafix.imaging import Volume
 from hexafix.markers import find_balls
 
@@ -81,7 +81,7 @@ def by_simpleitk_isosurface(held: tuple[Any, Volume], diameter_mm: float) -> Arr
     image, volume = held
     shapes, kept = _simpleitk_shapes(image, diameter_mm)
     return _stacked(
-        [isosurface_center(volume, np.array(shapes.GetCentroid(k)), diameter_mm) for k in kept]
+        [_isosurface_center(volume, np.array(shapes.GetCentroid(k)), diameter_mm) for k in kept]
     )
 
 
@@ -96,7 +96,7 @@ def by_skimage_isosurface(volume: Volume, diameter_mm: float) -> Array:
     """scikit-image: label, regionprops, then marching cubes and least squares."""
     kept = _skimage_regions(volume, diameter_mm)
     middles = [volume.lps_from_ijk(np.array(region.centroid)[::-1]) for region in kept]
-    return _stacked([isosurface_center(volume, one, diameter_mm) for one in middles])
+    return _stacked([_isosurface_center(volume, one, diameter_mm) for one in middles])
 
 
 def _skimage_regions(volume: Volume, diameter_mm: float) -> list[Any]:
@@ -173,22 +173,17 @@ def by_vtk(held: tuple[Any, Volume], diameter_mm: float) -> Array:
     return _stacked(centers)
 
 
-def isosurface_center(volume: Volume, near_mm: Array, diameter_mm: float) -> Array:
-    """Centre by marching cubes and least squares near a place, shape (3,), LPS mm.
-
-    Source: Section 3.2, the paper's recipe.
-    """
-    from skimage.measure import marching_cubes
-
+def _isosurface_center(volume: Volume, near_mm: Array, diameter_mm: float) -> Array:
+    """Centre by the paper's recipe in the crop near a place, shape (3,), LPS mm."""
     spacing = np.asarray(volume.spacing_mm, float)
     middle, reach = volume.ijk_from_lps(near_mm), diameter_mm / spacing
     low = np.maximum(np.floor(middle - reach), 0).astype(int)
     high = np.ceil(middle + reach).astype(int) + 1
     crop = volume.voxels[low[2] : high[2], low[1] : high[1], low[0] : high[0]]
-    vertices = marching_cubes(crop.astype(np.float32), HALF_HEIGHT_HU)[0]
-    points = volume.lps_from_ijk(vertices[:, ::-1] + low)
-    return least_squares_sphere(
-        points[np.linalg.norm(points - near_mm, axis=1) < 0.75 * diameter_mm]
+    affine = volume.ijk_to_lps.copy()
+    affine[:3, 3] = volume.lps_from_ijk(low)
+    return isosurface_center(
+        Volume(crop, affine), near_mm=near_mm, diameter_mm=diameter_mm, level_hu=HALF_HEIGHT_HU
     )
 
 

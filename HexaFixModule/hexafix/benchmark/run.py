@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from hexafix.errors import InputError
@@ -30,18 +30,29 @@ def run(names: Sequence[str] = (), *, quick: bool = False) -> list[Row]:
     InputError
         If a name is unknown.
     """
-    unknown = sorted(set(names) - set(GROUPS))
-    if unknown:
-        raise InputError.of(
-            "benchmark-unknown",
-            "there is no such measurement",
-            value=", ".join(unknown),
-            limit=", ".join(GROUPS),
-        )
+    require_known(names, GROUPS, what="measurement")
     rows = []
     for name in names or GROUPS:
         rows += [{"group": name, **row} for row in GROUPS[name](quick)]
     return rows
+
+
+def require_known(names: Iterable[str], known: Iterable[str], *, what: str) -> None:
+    """Refuse names that nothing here goes by.
+
+    Raises
+    ------
+    InputError
+        With the names and those there are.
+    """
+    unknown = sorted(set(names) - set(known))
+    if unknown:
+        raise InputError.of(
+            "benchmark-unknown",
+            f"there is no such {what}",
+            value=", ".join(unknown),
+            limit=", ".join(known),
+        )
 
 
 def print_rows(rows: Sequence[Row]) -> None:

@@ -46,13 +46,18 @@ def load_case(path: Path, *, needs_image: bool = True, plannable: bool = True) -
     InputError
         With every fault found, each at its JSON path.
     """
-    path = Path(path)
-    if path.is_dir() and (path / "case.json").is_file():
-        path = path / "case.json"
+    path = file_of_case(path)
     raw, _ = read_json_object(path, what="case file")
     return case_from_document(
         raw, folder=path.resolve().parent, needs_image=needs_image, plannable=plannable
     )
+
+
+def file_of_case(path: Path) -> Path:
+    """The file itself, or the ``case.json`` of the folder given."""
+    path = Path(path)
+    inside = path / "case.json"
+    return inside if path.is_dir() and inside.is_file() else path
 
 
 def case_from_document(
@@ -99,9 +104,7 @@ def load_layouts(path: Path) -> tuple[MarkerLayout, MarkerLayout]:
     InputError
         With every fault found.
     """
-    path = Path(path)
-    if path.is_dir() and (path / "case.json").is_file():
-        path = path / "case.json"
+    path = file_of_case(path)
     raw, content = read_json_object(path, what="layout file")
     if "case_id" in content or "markers" in content:
         case = load_case(path, needs_image=False, plannable=False)

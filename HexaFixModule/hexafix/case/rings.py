@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hexafix.case import checks
-from hexafix.case.read import layout_of, load_case, load_layouts, schema_faults
+from hexafix.case.read import file_of_case, layout_of, load_case, load_layouts, schema_faults
 from hexafix.case.schema import RingFile
 from hexafix.errors import InputError
 from hexafix.hardware import (
@@ -53,9 +53,7 @@ def load_rings(path: Path) -> Rings:
     InputError
         With every fault found.
     """
-    path = Path(path)
-    if path.is_dir() and (path / "case.json").is_file():
-        path = path / "case.json"
+    path = file_of_case(path)
     raw, content = read_json_object(path, what="ring, layout or case file")
     if "case_id" in content or "limb" in content:
         case = load_case(path, needs_image=False, plannable=False)

@@ -19,6 +19,7 @@ from hexafix.imaging.dicom_series import (
 )
 from hexafix.imaging.fingerprint import combine
 from hexafix.imaging.gantry_tilt import TILT_TOLERANCE_DEG
+from hexafix.imaging.grey_doubts import no_air, thick_slices
 from hexafix.imaging.header_words import shown_modality
 from hexafix.imaging.hounsfield import faults_of_values
 from hexafix.imaging.pixel_data import (
@@ -30,9 +31,6 @@ from hexafix.imaging.pixel_data import (
 from hexafix.imaging.slice_stack import SliceStack, arrange
 from hexafix.imaging.volume import Acquisition, ImageSource, Volume
 from hexafix.progress import Progress
-
-THICK_SLICES_MM = 2.0
-_AIR_SEEN_HU = -900
 
 _Value = TypeVar("_Value", bound=Hashable)
 
@@ -105,8 +103,7 @@ def _warnings(
             "were resampled from per-slice geometry, each moved within its own plane"
         )
     spacing = float(stack.gaps_mm.mean())
-    if max(spacing, *(item.thickness_mm or 0.0 for item in slices)) > THICK_SLICES_MM:
-        yield f"thick slices (spacing {spacing:.2f} mm): ball centres are less accurate"
+    yield from thick_slices(spacing, thickest_mm=max(item.thickness_mm or 0.0 for item in slices))
     if any(item.lossy or item.pixels.transfer_syntax in LOSSY_SYNTAXES for item in slices):
         yield "lossy (H10): the pixels were compressed with loss"
     modality = stack.slices[0].modality
@@ -115,8 +112,7 @@ def _warnings(
         yield f"modality {shown} (H10): the grey values are no Hounsfield units"
     elif any(item.rescale_type not in (None, "HU", "US") for item in slices):
         yield "rescale type (H10): the header does not call the grey values Hounsfield units"
-    if pixels.lowest_hu > _AIR_SEEN_HU:
-        yield f"no air (H10): the lowest value is {pixels.lowest_hu:.0f} HU"
+    yield from no_air(pixels.lowest_hu)
     if stack.slices[0].image_type[:2] and "PRIMARY" not in stack.slices[0].image_type[:2]:
         yield "secondary images (H05): the slices were computed from other slices"
     if stack.doubled:

@@ -20,6 +20,7 @@ from hexafix.imaging.file_geometry import (
 )
 from hexafix.imaging.fingerprint import fingerprint
 from hexafix.imaging.golden_image_files import ItkProof
+from hexafix.imaging.grey_doubts import no_air, thick_slices
 from hexafix.imaging.isolation import run_isolated
 from hexafix.imaging.metaimage_header import read_metaimage_header
 from hexafix.imaging.nifti_header import read_nifti_header
@@ -28,8 +29,6 @@ from hexafix.imaging.pixel_data import MAX_VOXELS
 from hexafix.imaging.volume import ImageSource, Volume
 from hexafix.progress import Progress
 
-THICK_SLICES_MM = 2.0
-_AIR_SEEN_HU = -900
 _INT16 = np.iinfo(np.int16)
 
 # The child's limits: Python, NumPy and ITK themselves, then image and copy at eight bytes a voxel.
@@ -176,13 +175,5 @@ def _hounsfield(array: NDArray) -> NDArray:
 
 
 def _warnings(voxels: NDArray, geometry: FileGeometry) -> list[str]:
-    found = []
     spacing = np.linalg.norm(geometry.ijk_to_lps[:3, :3], axis=0)
-    if spacing.max() > THICK_SLICES_MM:
-        found.append(
-            f"thick slices (spacing {spacing.max():.2f} mm): ball centres are less accurate"
-        )
-    lowest = float(voxels.min())
-    if lowest > _AIR_SEEN_HU:
-        found.append(f"no air (H10): the lowest value is {lowest:.0f} HU")
-    return found
+    return [*thick_slices(float(spacing.max())), *no_air(float(voxels.min()))]
