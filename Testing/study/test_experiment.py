@@ -27,6 +27,7 @@ from hexafix.study.experiment_chain import (
     enact,
     vector,
 )
+from hexafix.study.experiment_document import experiment_document
 from hexafix.study.experiment_figure import experiment_figure
 from hexafix.study.experiment_floor import installation_floor
 from hexafix.study.experiment_goals import budgets, goals
@@ -195,7 +196,7 @@ def test_compensation_beats_none_and_hand_scales_are_coarser(trials):
 
 
 def test_summaries_are_those_of_the_standard_library(small):
-    document = small.as_json()
+    document = experiment_document(small)
     parts = [document["rendered"]["before"]]
     parts += [row["error"] for row in document["rendered"]["recognised"]]
     parts += [row[kind] for row in document["rendered"]["corrected"]
@@ -263,7 +264,7 @@ def test_the_whole_ct_gives_every_ball_to_both_fits(small):
 
 def test_the_number_of_jobs_changes_nothing(small):
     again = study_experiment(replace(SMALL, jobs=2))
-    assert json.dumps(again.as_json()) == json.dumps(small.as_json())
+    assert json.dumps(experiment_document(again)) == json.dumps(experiment_document(small))
 
 
 def test_another_seed_draws_other_poses():
@@ -295,7 +296,7 @@ def test_the_budget_switches_one_source_on_at_a_time(small):
 
 
 def test_every_output_says_that_it_is_simulated(small):
-    document = json.loads(json.dumps(small.as_json(), allow_nan=False))
+    document = json.loads(json.dumps(experiment_document(small), allow_nan=False))
     assert document["simulated"] is True
     assert "jobs" not in document["settings"]
     text, page = experiment_text(small), experiment_page(small)

@@ -88,13 +88,14 @@ def experiment(
 ) -> int:
     """Tables 1 and 2 re-enacted on simulated CT: Section 5.2, with an error budget."""
     from hexafix.study.experiment import study_experiment
+    from hexafix.study.experiment_document import experiment_document
     from hexafix.study.experiment_tables import experiment_text
     from hexafix.study.experiment_trial import ExperimentSettings
     from hexafix.study.write import write_experiment
 
     settings = ExperimentSettings(poses=poses, drawn=drawn, seed=seed, voxel_mm=voxel_mm, jobs=jobs)
     return _run(study_experiment, experiment_text, write_experiment, settings, out, None, json,
-                quiet)  # fmt: skip
+                quiet, document=experiment_document)  # fmt: skip
 
 
 @study.command
@@ -122,7 +123,7 @@ def _settings(
 
 def _run(
     do: Any, text: Any, write: Any, settings: Any, out: Path | None, dask: str | None,
-    json: bool, quiet: bool,
+    json: bool, quiet: bool, *, document: Any = None,
 ) -> int:  # fmt: skip
     """Do a study, write its files if a folder is given, and print it."""
     from hexafix.study.plotting import require_matplotlib
@@ -134,7 +135,7 @@ def _run(
         with dask_cluster(dask):
             found = do(settings, progress=progress)
         written = write(found, out, progress=progress) if out is not None else ()
-    print_json(found.as_json()) if json else print(text(found))
+    print_json(document(found) if document else found.as_json()) if json else print(text(found))
     if written and not json:
         print(f"\n{len(written)} files in {out}")
     return 0

@@ -1,4 +1,4 @@
-"""The paper's Section 4 re-enacted: how many markers, where, and how exact a ring's pose is.
+"""The paper's Section 4 and its experiment re-enacted: how many markers, where, how exact a pose.
 
 Every answer is given three times: by covariance (exact), by Monte Carlo of the linear model, and
 by full simulation of the recognition; for the paper's group method and for least squares.

@@ -91,12 +91,6 @@ class ExperimentStudy:
         """Both runs by name."""
         return {"rendered": self.rendered, "drawn": self.drawn}
 
-    def as_json(self) -> dict[str, Any]:
-        """The document of ``study experiment``."""
-        from hexafix.study.experiment_document import experiment_document
-
-        return experiment_document(self)
-
 
 def study_experiment(
     settings: ExperimentSettings | None = None, *, progress: Progress = silent

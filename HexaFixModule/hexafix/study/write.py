@@ -10,6 +10,7 @@ from hexafix.errors import InputError
 from hexafix.progress import Progress, silent
 from hexafix.study.angles import AnglesStudy
 from hexafix.study.experiment import ExperimentStudy
+from hexafix.study.experiment_document import experiment_document
 from hexafix.study.experiment_figure import experiment_figure
 from hexafix.study.experiment_tables import experiment_page
 from hexafix.study.figures import figure_5, figure_6, figure_7
@@ -49,7 +50,10 @@ def write_experiment(
     study: ExperimentStudy, folder: Path, *, progress: Progress = silent
 ) -> tuple[Path, ...]:
     """Write figure, page and JSON of the simulated experiment; return their paths."""
-    texts = {"experiment.md": experiment_page(study), "experiment.json": _json(study.as_json())}
+    texts = {
+        "experiment.md": experiment_page(study),
+        "experiment.json": _json(experiment_document(study)),
+    }
     return _written(folder, texts, {"experiment": lambda: experiment_figure(study)}, progress)
 
 
