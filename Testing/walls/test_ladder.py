@@ -35,7 +35,14 @@ LADDER = {
     "pipeline": 10,
     "benchmark": 11,
     "scenarios": 11,
+    "surfaces": 11,
+    "presenter": 11,
+    "mrml": 12,
+    "panel": 12,
     "study": 12,
+    "web": 13,
+    "qt": 13,
+    "slicer_panel": 13,
     "comparison": 13,
     "cli": 14,
     "__main__": 15,
@@ -43,7 +50,7 @@ LADDER = {
 """Each room's level: a room may import rooms of lower levels only."""
 
 SIDEWAYS_OR_DOORS = {"vtk", "vtkmodules", "pyvista", "slicer", "qt", "ctk", "qtpy", "PySide6",
-                     "trame", "trame_slicer", "matplotlib", "skimage", "joblib",
+                     "trame", "trame_slicer", "pyvistaqt", "matplotlib", "skimage", "joblib",
                      "distributed", "cc3d"}  # fmt: skip
 """Optional libraries: never imported at a module's top level."""
 
@@ -76,6 +83,25 @@ LIBRARIES = {
     "benchmark": {"numpy", "scipy", "pydicom", "SimpleITK", "skimage", "vtkmodules", "psutil"}
     | {"cc3d"},
     "comparison": {"matplotlib"},
+    "surfaces": {"numpy", "vtkmodules"},
+    "presenter": set(),
+    "mrml": {"numpy", "slicer", "vtk", "vtkmodules"},
+    "panel": set(),
+    "web": {
+        "trame",
+        "trame_client",
+        "trame_server",
+        "trame_slicer",
+        "trame_vuetify",
+        "trame_rca",
+        "wslink",
+        "aiohttp",
+        "slicer",
+        "vtk",
+        "vtkmodules",
+    },
+    "qt": {"qtpy", "PySide6", "pyvista", "pyvistaqt", "vtkmodules"},
+    "slicer_panel": {"qt", "ctk", "slicer", "vtk"},
 }
 """What each room may use besides the standard library, anywhere in its files."""
 
