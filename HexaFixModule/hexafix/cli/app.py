@@ -19,6 +19,7 @@ from hexafix.cli.console import (
     quiet_libraries,
     report_error,
 )
+from hexafix.cli.serve import serve
 from hexafix.cli.study import study
 from hexafix.errors import HexaFixError
 
@@ -41,6 +42,7 @@ app = App(
 )
 app.command(study)
 app.command(advise)
+app.command(serve)
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document.")]
 Quiet = Annotated[bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress.")]

@@ -1,0 +1,62 @@
+"""The ``serve`` command: the workstation in the browser."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hexafix.errors import InputError, MissingLibrary
+
+
+def serve(
+    case: Annotated[Path | None, Parameter(help="The case file; none: an empty case.")] = None,
+    *,
+    host: Annotated[
+        str, Parameter(help="Address to listen on; any but this machine's own needs --token.")
+    ] = "127.0.0.1",
+    port: Annotated[int, Parameter(help="Port to listen on; 0: any free one.")] = 0,
+    token: Annotated[
+        str | None,
+        Parameter(help="Secret that the browser must bring; auto, and without --host: a new one."),
+    ] = None,
+    no_browser: Annotated[bool, Parameter(negative="", help="Only print the address.")] = False,
+) -> int:
+    """Open the workstation in the browser; it serves this machine only and ends by Ctrl-C."""
+    from hexafix.web.server import access, is_loopback
+
+    allowed = access(host=host, port=port, token=token)
+    if case is not None and not case.is_file():
+        raise InputError.of(
+            "case-missing",
+            "there is no such case file",
+            where=str(case),
+            next_step="name a case.json, or leave it out and load a CT in the workstation",
+        )
+    if find_spec("trame_slicer") is None:
+        raise MissingLibrary.of(
+            "library-missing",
+            "the workstation needs trame-slicer",
+            next_step="install hexafix[workstation]",
+        )
+    from hexafix.web.run import serve as run
+
+    if not is_loopback(host):
+        print(
+            "hexafix: others can reach this address and nothing on the way is encrypted: use it "
+            "only inside a network you trust, or an SSH tunnel instead of --host",
+            file=sys.stderr,
+        )
+
+    def ready(url: str) -> None:
+        print(url, flush=True)
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    run(case, allowed, ready=ready)
+    return 0

@@ -1,0 +1,104 @@
+"""Start the workstation, say where it is, and end it cleanly."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from hexafix.web.server import Access, Guard, add_downloads
+
+CLOSING_S = 3.0
+"""How long clients get to say goodbye."""
+
+
+def prepare_environment() -> None:
+    """Keep foreign settings out: trame and wslink listen to the environment and to `sys.argv`."""
+    for name in [n for n in os.environ if n.startswith(("TRAME_", "WSLINK_"))]:
+        del os.environ[name]
+    os.environ["TRAME_ARGS"] = ""
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+
+
+def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> None:
+    """Serve the workstation until it is interrupted.
+
+    Parameters
+    ----------
+    case : Path or None
+        Case file to open.
+    access : Access
+        Where to listen and who may ask.
+    ready : callable
+        Called once with the address to open.
+    """
+    prepare_environment()
+    with suppress(KeyboardInterrupt):
+        asyncio.run(_serve(case, access, ready))
+
+
+async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any]) -> None:
+    from hexafix.web.app import Workstation
+
+    stop = asyncio.Event()
+    with suppress(NotImplementedError):
+        for name in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(name, stop.set)
+    workstation = Workstation()
+    server = workstation.server
+    server.controller.on_server_bind.add(
+        lambda bound: guard_application(bound.app, access, workstation)
+    )
+    server.controller.on_server_ready.add(lambda **_: ready(access.url(server.port)))
+    running = asyncio.ensure_future(start(server, access))
+    stopped = asyncio.ensure_future(stop.wait())
+    try:
+        if case is not None:
+            workstation.open_case(case)
+        await asyncio.wait({running, stopped}, return_when=asyncio.FIRST_COMPLETED)
+        if running.done():
+            running.result()
+    finally:
+        await _end(workstation, running, stopped)
+
+
+def start(server: Any, access: Access) -> Any:
+    """Trame's own start, bound to our host and to nothing of the environment."""
+    return server.start(
+        port=access.port,
+        host=access.host,
+        backend="aiohttp",
+        exec_mode="coroutine",
+        thread=True,
+        open_browser=False,
+        show_connection_info=False,
+        disable_logging=True,
+        follow_symlinks=False,
+        timeout=0,
+    )
+
+
+def guard_application(app: Any, access: Access, workstation: Any) -> None:
+    """Guard, page and downloads, before trame's own routes."""
+    from trame_client.module import vue3
+
+    from hexafix.web.page import add_page, index_text, policy
+
+    text = index_text(Path(vue3.www))
+    Guard(access, policy(text)).install(app)
+    add_page(app, text)
+    add_downloads(app, workstation.presenter.prescription_files)
+
+
+async def _end(workstation: Any, running: Any, stopped: Any) -> None:
+    workstation.close()
+    with suppress(Exception):
+        await asyncio.wait_for(workstation.server.stop(), CLOSING_S)
+    for task in (running, stopped):
+        task.cancel()
+    print("hexafix: the workstation has ended", file=sys.stderr)

@@ -1,0 +1,103 @@
+"""A workstation on this machine and a real Chromium before it, both surely ended."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHROMIUM = "/usr/bin/chromium"
+
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+PACKAGE = Path(__file__).resolve().parents[2] / "HexaFixModule"
+
+
+@pytest.fixture(scope="session")
+def a_case_on_disk(a_phantom, tmp_path_factory):
+    """The phantom's case file beside its CT as NRRD; copy the folder before changing it."""
+    from hexafix.phantom import write_phantom
+
+    folder = tmp_path_factory.mktemp("workstation") / "phantom"
+    write_phantom(a_phantom, folder, image_format="nrrd")
+    return folder / "case.json"
+
+
+@pytest.fixture(scope="session")
+def start_serving():
+    """Starts `hexafix serve` in its own process: `start_serving(*arguments) -> (process, url)`."""
+    started = []
+
+    def start(*arguments):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "hexafix", "serve", *map(str, arguments), "--no-browser"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": str(PACKAGE), "OPENBLAS_NUM_THREADS": "1"},
+        )
+        started.append(process)
+        url = process.stdout.readline().strip()
+        assert url.startswith("http://"), process.stderr.read()
+        return process, url
+
+    yield start
+    for process in started:
+        end(process)
+
+
+def end(process):
+    """Interrupt a server, as Ctrl-C does; whatever is left after ten seconds is killed."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+    try:
+        process.communicate(timeout=10)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+@pytest.fixture
+def a_workstation_url(start_serving, a_case_on_disk):
+    """Address, with its token, of a workstation that has the phantom's case open."""
+    process, url = start_serving(a_case_on_disk)
+    yield url
+    end(process)
+
+
+@pytest.fixture(scope="session")
+def a_chromium():
+    """One Chromium for all pages."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def a_page(a_chromium, tmp_path):
+    """A fresh page that keeps what it asked for (`asked`) and what it complained of (`said`)."""
+    context = a_chromium.new_context(
+        viewport={"width": 1600, "height": 1000}, accept_downloads=True
+    )
+    page = context.new_page()
+    page.asked, page.said = [], []
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.on("websocket", lambda socket: page.asked.append(socket.url))
+    page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: page.said.append(str(error)))
+    yield page
+    context.close()
