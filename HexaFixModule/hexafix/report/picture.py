@@ -238,12 +238,7 @@ def _rgb(colour: str) -> list[float]:
 
 def _arrays(scene: SceneGeometry) -> dict[str, Any]:
     """The scene as plain arrays in LPS mm for the child."""
-    plates = []
-    for ring in ("proximal", "distal"):
-        outer, inner = scene.ring(ring).outer_radius_mm, scene.inner_radius_mm(ring)
-        low = -scene.ring(ring).thickness_mm
-        corners = ((outer, 0.0), (inner, 0.0), (inner, low), (outer, low))
-        plates.append([scene.outline_mm(ring, radius, z) for radius, z in corners])
+    plates = [scene.plate_mm(ring) for ring in ("proximal", "distal")]
     joints = [scene.joints_mm(ring) for ring in ("proximal", "distal")]
     views = scene_views(scene)
     sizes = np.array([[view.width_mm, view.height_mm] for view in views])

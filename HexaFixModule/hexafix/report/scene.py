@@ -128,6 +128,13 @@ class SceneGeometry:
         )
         return transform(self.ring_pose(ring), circle)
 
+    def plate_mm(self, ring: str) -> NDArray[np.float64]:
+        """A plate's edges in LPS, shape (4, 72, 3), mm: top outer, inner, low inner, outer."""
+        outer, inner = self.ring(ring).outer_radius_mm, self.inner_radius_mm(ring)
+        low = -self.ring(ring).thickness_mm
+        corners = ((outer, 0.0), (inner, 0.0), (inner, low), (outer, low))
+        return np.array([self.outline_mm(ring, radius, z) for radius, z in corners])
+
 
 def _fixator(definition: Mapping[str, Any]) -> Fixator:
     """The fixator of a definition that the case reader has already checked."""

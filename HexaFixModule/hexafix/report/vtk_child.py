@@ -1,13 +1,15 @@
 """Renders a scene with VTK in a process of its own, because a broken OpenGL ends the process.
 
-Run as a script, never imported by the program: it reads the name of a folder from standard input,
-takes ``scene.npz`` there and writes one PNG a view beside it.
+Run as a script it reads the name of a folder from standard input, takes ``scene.npz`` there and
+writes one PNG a view beside it. It imports nothing of HexaFix, so that it starts at once; the
+shapes it draws are shared with the workstation by `hexafix.surfaces`, which renders nothing here.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,17 +23,22 @@ EXIT_NO_VTK, EXIT_NO_WINDOW, EXIT_BLANK = 3, 4, 5
 STEEL, IVORY, BALL = (0.62, 0.66, 0.70), (0.96, 0.91, 0.78), (0.90, 0.92, 0.95)
 
 
-VTK_CLASSES = {
+SHAPE_CLASSES = {
     "vtkCommonCore": ("vtkPoints",),
     "vtkCommonDataModel": ("vtkCellArray", "vtkImageData", "vtkPolyData"),
     "vtkCommonTransforms": ("vtkTransform",),
     "vtkFiltersCore": (
         *("vtkFlyingEdges3D", "vtkPolyDataConnectivityFilter", "vtkPolyDataNormals"),
-        *("vtkTubeFilter", "vtkWindowedSincPolyDataFilter"),
+        *("vtkReverseSense", "vtkTubeFilter", "vtkWindowedSincPolyDataFilter"),
     ),
     "vtkFiltersGeneral": ("vtkTransformPolyDataFilter",),
     "vtkFiltersSources": ("vtkLineSource", "vtkSphereSource"),
     "vtkImagingGeneral": ("vtkImageGaussianSmooth",),
+    "util.numpy_support": ("numpy_to_vtk", "vtk_to_numpy"),
+}
+"""What the shapes need of VTK: nothing that touches OpenGL."""
+
+PICTURE_CLASSES = {
     "vtkIOImage": ("vtkPNGWriter",),
     "vtkRenderingCore": (
         *("vtkActor", "vtkLight", "vtkPolyDataMapper", "vtkRenderer", "vtkRenderWindow"),
@@ -39,15 +46,14 @@ VTK_CLASSES = {
     ),
     # The factories of OpenGL must be loaded, though nothing names them.
     "vtkRenderingOpenGL2": (),
-    "util.numpy_support": ("numpy_to_vtk", "vtk_to_numpy"),
 }
-"""The few modules of VTK that are loaded: a quarter of the time of the whole."""
+"""What the pictures need besides; together a quarter of the time of the whole of VTK."""
 
 
-def _import_vtk() -> Any:
-    """The needed VTK classes as attributes of one namespace."""
+def import_vtk(classes: Mapping[str, tuple[str, ...]]) -> Any:
+    """The named classes of VTK's modules as attributes of one namespace."""
     found = SimpleNamespace()
-    for module, names in VTK_CLASSES.items():
+    for module, names in classes.items():
         loaded = import_module(f"vtkmodules.{module}")
         for name in names:
             setattr(found, name, getattr(loaded, name))
@@ -73,16 +79,18 @@ def _actor(v: Any, source: Any, color: Any, **look: float) -> Any:
     return actor
 
 
-def _sphere(v: Any, center: Any, radius: float) -> Any:
+def sphere(v: Any, center: Any, radius: float, *, resolution: int = 40) -> Any:
+    """Source of a ball about an LPS point, mm."""
     source = v.vtkSphereSource()
     source.SetCenter(*(float(x) for x in center))
     source.SetRadius(float(radius))
-    source.SetThetaResolution(40)
-    source.SetPhiResolution(40)
+    source.SetThetaResolution(resolution)
+    source.SetPhiResolution(resolution)
     return source
 
 
-def _tube(v: Any, start: Any, end: Any, radius: float) -> Any:
+def tube(v: Any, start: Any, end: Any, radius: float) -> Any:
+    """Filter that makes a closed round rod between two LPS points, mm."""
     line = v.vtkLineSource()
     line.SetPoint1(*(float(x) for x in start))
     line.SetPoint2(*(float(x) for x in end))
@@ -94,7 +102,7 @@ def _tube(v: Any, start: Any, end: Any, radius: float) -> Any:
     return tube
 
 
-def _plate(v: Any, outlines: Any) -> Any:
+def plate(v: Any, outlines: Any) -> Any:
     """A ring plate from its outlines, shape (4, N, 3): top outer, inner, then low inner, outer."""
     import numpy as np
 
@@ -119,8 +127,26 @@ def _plate(v: Any, outlines: Any) -> Any:
     return normals
 
 
-def _surface(v: Any, image: Any, affine: Any, level: float) -> Any | None:
-    """The iso-surface of the coarse CT in LPS without specks, or None if there is none."""
+def blurred(v: Any, hu: Any) -> Any:
+    """Filter that smooths the noise of a coarse CT, HU of shape (K, J, I), in voxel space."""
+    k, j, i = hu.shape
+    image = v.vtkImageData()
+    image.SetDimensions(i, j, k)
+    image.GetPointData().SetScalars(v.numpy_to_vtk(hu.ravel(), deep=True))
+    smooth = v.vtkImageGaussianSmooth()
+    smooth.SetInputData(image)
+    smooth.SetStandardDeviations(0.7, 0.7, 0.7)
+    return smooth
+
+
+def surface(v: Any, image: Any, affine: Any, level: float) -> Any | None:
+    """The iso-surface of the coarse CT in LPS without specks, or None if there is none.
+
+    Its normals and the order of its corners point out of what is denser than `level` HU, whatever
+    the hand of the voxel grid.
+    """
+    import numpy as np
+
     contour = v.vtkFlyingEdges3D()
     contour.SetInputConnection(image.GetOutputPort())
     contour.SetValue(0, level)
@@ -149,8 +175,15 @@ def _surface(v: Any, image: Any, affine: Any, level: float) -> Any | None:
     moved = v.vtkTransformPolyDataFilter()
     moved.SetTransform(place)
     moved.SetInputConnection(smooth.GetOutputPort())
+    outward = moved
+    if np.linalg.det(affine[:3, :3]) < 0:
+        # A mirrored voxel grid turns the triangles inside out.
+        outward = v.vtkReverseSense()
+        outward.SetInputConnection(moved.GetOutputPort())
+        outward.ReverseCellsOn()
+        outward.ReverseNormalsOff()
     normals = v.vtkPolyDataNormals()
-    normals.SetInputConnection(moved.GetOutputPort())
+    normals.SetInputConnection(outward.GetOutputPort())
     normals.SplittingOff()
     normals.ConsistencyOff()
     normals.Update()
@@ -158,26 +191,14 @@ def _surface(v: Any, image: Any, affine: Any, level: float) -> Any | None:
 
 
 def _bone_actors(v: Any, hu: Any, affine: Any) -> list[Any]:
-    import numpy as np
-
-    k, j, i = hu.shape
-    image = v.vtkImageData()
-    image.SetDimensions(i, j, k)
-    image.GetPointData().SetScalars(v.numpy_to_vtk(hu.ravel(), deep=True))
-    blurred = v.vtkImageGaussianSmooth()
-    blurred.SetInputData(image)
-    blurred.SetStandardDeviations(0.7, 0.7, 0.7)
-    bone = _surface(v, blurred, affine, BONE_HU)
-    metal = _surface(v, blurred, affine, METAL_HU)
+    image = blurred(v, hu)
+    bone = surface(v, image, affine, BONE_HU)
+    metal = surface(v, image, affine, METAL_HU)
     actors = []
     if bone is not None:
         actor = _actor(v, bone, IVORY, opacity=0.7, specular=0.05)
-        # Only the near side of the bone is drawn: translucent without sorting by depth. A mirrored
-        # voxel grid turns the triangles inside out.
-        if np.linalg.det(affine[:3, :3]) > 0:
-            actor.GetProperty().BackfaceCullingOn()
-        else:
-            actor.GetProperty().FrontfaceCullingOn()
+        # Only the near side of the bone is drawn: translucent without sorting by depth.
+        actor.GetProperty().BackfaceCullingOn()
         actors.append(actor)
     if metal is not None:
         actors.append(_actor(v, metal, STEEL, specular=0.5))
@@ -187,14 +208,14 @@ def _bone_actors(v: Any, hu: Any, affine: Any) -> list[Any]:
 def _actors(v: Any, scene: Any) -> list[Any]:
     actors = []
     for outlines, color in zip(scene["plates"], scene["plate_colors"], strict=True):
-        actors.append(_actor(v, _plate(v, outlines), color, specular=0.25))
+        actors.append(_actor(v, plate(v, outlines), color, specular=0.25))
     for (a, b), color in zip(scene["struts"], scene["strut_colors"], strict=True):
         middle = a + 0.62 * (b - a)
-        actors.append(_actor(v, _tube(v, b, middle, 5.5), color, specular=0.3))
-        actors.append(_actor(v, _tube(v, a, b, 3.4), color, specular=0.3))
-        actors.extend(_actor(v, _sphere(v, end, 6.0), STEEL, specular=0.5) for end in (a, b))
+        actors.append(_actor(v, tube(v, b, middle, 5.5), color, specular=0.3))
+        actors.append(_actor(v, tube(v, a, b, 3.4), color, specular=0.3))
+        actors.extend(_actor(v, sphere(v, end, 6.0), STEEL, specular=0.5) for end in (a, b))
     for center, diameter in zip(scene["balls"], scene["ball_diameters"], strict=True):
-        actors.append(_actor(v, _sphere(v, center, diameter / 2), BALL, specular=0.9, power=40.0))
+        actors.append(_actor(v, sphere(v, center, diameter / 2), BALL, specular=0.9, power=40.0))
     if scene["bone"].size:
         actors.extend(_bone_actors(v, scene["bone"], scene["bone_affine"]))
     return actors
@@ -240,7 +261,7 @@ def _window(v: Any) -> tuple[Any, Any] | None:
     renderer.UseFXAAOn()
     _light(renderer, v)
     window.AddRenderer(renderer)
-    warm = [_actor(v, _sphere(v, (9.0 * n, 0.0, 0.0), 4.0), BALL, opacity=o)
+    warm = [_actor(v, sphere(v, (9.0 * n, 0.0, 0.0), 4.0), BALL, opacity=o)
             for n, o in enumerate((1.0, 0.7))]  # fmt: skip
     for actor in warm:
         renderer.AddActor(actor)
@@ -285,7 +306,7 @@ def render(folder: Path, v: Any, window: Any, renderer: Any) -> int:
 def main() -> int:
     """Import VTK, wait for the folder's name, render."""
     try:
-        v = _import_vtk()
+        v = import_vtk(SHAPE_CLASSES | PICTURE_CLASSES)
     except ImportError:
         return EXIT_NO_VTK
     made = _window(v)
