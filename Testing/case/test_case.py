@@ -62,7 +62,7 @@ def test_every_fault_is_named_at_once_with_its_path(a_case_document, a_case_fold
 @pytest.mark.parametrize(
     ("path", "value", "where"),
     [
-        (("schema_version",), 2, "schema_version"),
+        (("schema_version",), 3, "schema_version"),
         (("case_id",), "../x", "case_id"),
         (("strut_readings_mm", 0), "190,2", "strut_readings_mm[0]"),
         (("strut_readings_mm",), [190.0] * 5, "strut_readings_mm"),

@@ -138,7 +138,7 @@ def test_of_two_fits_that_overlap_only_the_rounder_one_stays():
     def fit(place, rms):
         shape = {"diameter_mm": 10.0, "covariance_mm2": np.eye(3), "core_hu": 2000.0}
         ball = Ball(np.array(place), rms_residual_mm=rms, method="gradient-rays", **shape)
-        return find._Fitted(ball, 2000.0)
+        return find.FittedBall(ball, 2000.0)
 
     good, worse, apart = fit([0, 0, 0.0], 0.02), fit([8.0, 0, 0], 0.05), fit([30.0, 0, 0], 0.04)
     kept, dropped = find._apart([worse, good, apart], 5.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from hexafix.correction.targets import Correction
 from hexafix.hardware import Fixator, MarkerLayout
+from hexafix.markers import MarkerEdits
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,11 @@ class Case:
         Scale readings today.
     correction : Correction or None
     schedule : ScheduleRules or None
+    marker_edits : MarkerEdits
+        The user's corrections of the balls found; empty where the case has none.
+    ring_front_confirmed : bool or None
+        Whether the user compared both rings' front (notch) with the picture (H22); None where the
+        case does not tell.
     document : mapping
         The case file's content, the fixator replaced by its whole definition and the image's
         path removed (a path may hold a name).
@@ -99,3 +106,9 @@ class Case:
     document: MappingProxyType[str, Any]
     case_sha256: str
     fixator_sha256: str
+    marker_edits: MarkerEdits = field(default_factory=MarkerEdits)
+    ring_front_confirmed: bool | None = None
+
+    def read_from(self, raw: bytes) -> Case:
+        """The same case with the hash of the bytes it was read from."""
+        return replace(self, case_sha256=hashlib.sha256(raw).hexdigest())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from hexafix.case import checks
 from hexafix.case.case import Case, Limb, ScheduleRules
-from hexafix.case.schema import CaseFile, LayoutFile
+from hexafix.case.schema import VERSION_2_KEYS, CaseFile, LayoutFile, case_schema
 from hexafix.correction.targets import (
     Correction,
     FragmentMotion,
@@ -25,6 +26,7 @@ from hexafix.errors import Fault, InputError
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator, MarkerLayout, MarkerSite
 from hexafix.hardware.definition import fixator_from_document, shipped_fixators
+from hexafix.markers import MarkerEdits
 from hexafix.paths import resources
 from hexafix.strict_json import parse_json_object, read_json_object
 
@@ -46,11 +48,21 @@ def load_case(path: Path, *, needs_image: bool = True, plannable: bool = True) -
     InputError
         With every fault found, each at its JSON path.
     """
+    raw, folder = load_raw_case(path)
+    return case_from_document(raw, folder=folder, needs_image=needs_image, plannable=plannable)
+
+
+def load_raw_case(path: Path) -> tuple[bytes, Path]:
+    """The bytes of a case file, perhaps unfinished, and the folder where its paths start.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds no JSON object.
+    """
     path = file_of_case(path)
     raw, _ = read_json_object(path, what="case file")
-    return case_from_document(
-        raw, folder=path.resolve().parent, needs_image=needs_image, plannable=plannable
-    )
+    return raw, path.resolve().parent
 
 
 def file_of_case(path: Path) -> Path:
@@ -64,12 +76,54 @@ def case_from_document(
     raw: bytes, *, folder: Path, needs_image: bool = True, plannable: bool = True
 ) -> Case:
     """A case from the bytes of a case file that lies in `folder`; see `load_case`."""
+    parsed = _parse(raw, folder=folder, needs_image=needs_image, plannable=plannable)
+    if parsed.faults or parsed.fixator is None or parsed.image is None:
+        raise InputError(*parsed.faults)
+    model = case_schema(parsed.content).model_validate_json(raw)
+    return _build(
+        model,
+        image=parsed.image,
+        fixator=parsed.fixator,
+        definition=parsed.definition,
+        raw=raw,
+    )
+
+
+def draft_faults(raw: bytes, *, folder: Path) -> tuple[Fault, ...]:
+    """Everything that keeps a case from being planned, each with its JSON path; never raises.
+
+    Parameters
+    ----------
+    raw : bytes
+        The case file, perhaps unfinished.
+    folder : Path
+        Where its image and fixator paths start.
+    """
+    try:
+        return tuple(_parse(raw, folder=folder, needs_image=True, plannable=True).faults)
+    except InputError as error:
+        return error.faults
+
+
+@dataclass(frozen=True, eq=False)
+class _Parsed:
+    """A case file's content, its faults, and what was found by them."""
+
+    content: dict[str, Any]
+    faults: list[Fault]
+    fixator: Fixator | None
+    definition: dict[str, Any]
+    image: Path | None
+
+
+def _parse(raw: bytes, *, folder: Path, needs_image: bool, plannable: bool) -> _Parsed:
+    """All faults of a case file at once."""
     content = parse_json_object(raw, what="case file", where="case.json")
-    faults, broken = schema_faults(CaseFile, raw)
-    fixator, definition, more = _resolve_fixator(content, broken, folder)
+    faults, broken = schema_faults(case_schema(content), raw)
+    fixator, definition, more = resolve_fixator(content, broken, folder)
     faults += more
     faults += _cross_faults(content, broken, fixator)
-    image = _image_path(content, broken, folder)
+    image = image_path(content, broken, folder)
     if needs_image and image is not None and not image.exists():
         faults.append(
             Fault(
@@ -90,10 +144,7 @@ def case_from_document(
             for key in ("strut_readings_mm", "correction", "schedule")
             if content.get(key) is None and key not in broken
         ]
-    if faults or fixator is None or image is None:
-        raise InputError(*faults)
-    model = CaseFile.model_validate_json(raw)
-    return _build(model, image=image, fixator=fixator, definition=definition, raw=raw)
+    return _Parsed(content, faults, fixator, definition, image)
 
 
 def load_layouts(path: Path) -> tuple[MarkerLayout, MarkerLayout]:
@@ -172,10 +223,10 @@ def _json_path(location: tuple[int | str, ...]) -> str:
     return text
 
 
-def _resolve_fixator(
+def resolve_fixator(
     content: dict[str, Any], broken: set[str], folder: Path
 ) -> tuple[Fixator | None, dict[str, Any], list[Fault]]:
-    """The fixator by shipped id, path or definition."""
+    """The fixator by shipped id, path or definition, that definition, and its faults."""
     if "fixator" in broken or "fixator" not in content:
         return None, {}, []
     given = content["fixator"]
@@ -229,7 +280,8 @@ def _cross_faults(
     return faults
 
 
-def _image_path(content: dict[str, Any], broken: set[str], folder: Path) -> Path | None:
+def image_path(content: dict[str, Any], broken: set[str], folder: Path) -> Path | None:
+    """Where the case's image lies, absolute."""
     if "image" in broken or "image" not in content:
         return None
     return (folder / content["image"]["path"]).resolve()
@@ -244,7 +296,17 @@ def layout_of(markers: list[Any]) -> MarkerLayout:
     return MarkerLayout(tuple(sorted(sites, key=lambda site: site.number)))
 
 
-def _correction(kind: Any) -> Correction | None:
+def marker_edits_of(part: Any) -> MarkerEdits:
+    """The edits of `schema.MarkerEditsPart`; none where there is no such part."""
+    if part is None:
+        return MarkerEdits()
+    return MarkerEdits(
+        added_lps_mm=np.array(part.added_lps_mm, float),
+        removed_lps_mm=np.array(part.removed_lps_mm, float),
+    )
+
+
+def correction_of(kind: Any) -> Correction | None:
     """The domain value of one correction kind, radians inside."""
     if kind is None:
         return None
@@ -265,7 +327,8 @@ def _correction(kind: Any) -> Correction | None:
     return checks.deformity_of(kind.model_dump())
 
 
-def _rules(schedule: Any) -> ScheduleRules | None:
+def rules_of(schedule: Any) -> ScheduleRules | None:
+    """The schedule's rules, radians inside."""
     if schedule is None:
         return None
     points = schedule.structures_at_risk_lps_mm
@@ -286,6 +349,9 @@ def _build(
     document = json.loads(model.model_dump_json())
     document["fixator"] = definition
     document["image"] = {"path": None, "series_instance_uid": None}
+    for key in VERSION_2_KEYS:
+        if document.get(key, ...) is None:
+            del document[key]
     numbering = None
     if model.numbering:
         numbering = MappingProxyType(
@@ -305,9 +371,11 @@ def _build(
         strut_readings_mm=None
         if model.strut_readings_mm is None
         else np.array(model.strut_readings_mm, float),
-        correction=_correction(model.correction),
-        schedule=_rules(model.schedule),
+        correction=correction_of(model.correction),
+        schedule=rules_of(model.schedule),
         document=MappingProxyType(document),
         case_sha256=hashlib.sha256(raw).hexdigest(),
         fixator_sha256=hashlib.sha256(canonical.encode()).hexdigest(),
+        marker_edits=marker_edits_of(getattr(model, "marker_edits", None)),
+        ring_front_confirmed=getattr(model, "ring_front_confirmed", None),
     )

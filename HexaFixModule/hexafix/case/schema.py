@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,6 +13,9 @@ MAX_RATE_MM_PER_DAY = 3.0
 
 MAX_RATE_DEG_PER_DAY = 5.0
 """Hard limit of the rotation rate a case may ask for (H28)."""
+
+CASE_ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$"
+"""Letters that every file system and the prescription's font hold."""
 
 Mm = Annotated[float, Field(ge=-5000.0, le=5000.0)]
 Deg = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -150,10 +154,10 @@ class Schedule(_Strict):
 
 
 class CaseFile(_Strict):
-    """The whole case file (``case.json``)."""
+    """The whole case file (``case.json``) of version 1; `EditedCaseFile` adds what 2 knows."""
 
-    schema_version: Literal[1]
-    case_id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$")]
+    schema_version: Literal[1, 2]
+    case_id: Annotated[str, Field(pattern=CASE_ID_PATTERN)]
     limb: Limb
     image: Image
     fixator: str | dict[str, Any]
@@ -162,3 +166,26 @@ class CaseFile(_Strict):
     strut_readings_mm: Annotated[list[Mm], Field(min_length=6, max_length=6)] | None = None
     correction: CorrectionKind | None = None
     schedule: Schedule | None = None
+
+
+class MarkerEditsPart(_Strict):
+    """The user's corrections of the balls found; a ball that was dragged stands in both."""
+
+    added_lps_mm: Annotated[list[Point], Field(max_length=200)] = []
+    removed_lps_mm: Annotated[list[Point], Field(max_length=200)] = []
+
+
+class EditedCaseFile(CaseFile):
+    """The case file of version 2: what the user corrects and confirms at a workstation."""
+
+    marker_edits: MarkerEditsPart | None = None
+    ring_front_confirmed: bool | None = None
+
+
+VERSION_2_KEYS = ("marker_edits", "ring_front_confirmed")
+"""Keys that version 1 does not know."""
+
+
+def case_schema(content: Mapping[str, Any]) -> type[CaseFile]:
+    """The schema of a case file's own version; 1 where it tells none that is known."""
+    return EditedCaseFile if content.get("schema_version") == 2 else CaseFile

@@ -30,6 +30,8 @@ class Ball:
         What the user should look at.
     clipped : bool
         Whether the scanner clipped the ball's core; its diameter then looks too large (H11).
+    added : bool
+        Whether the user put it there; tests that it failed stand among its warnings.
     """
 
     center_mm: NDArray[np.float64]
@@ -40,6 +42,7 @@ class Ball:
     method: str
     warnings: tuple[str, ...] = field(default=())
     clipped: bool = False
+    added: bool = False
 
     @property
     def sigma_mm(self) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,8 +40,8 @@ MOST_LISTED = 40
 
 
 @dataclass(frozen=True, eq=False)
-class _Fitted:
-    """A candidate that passed every test of its own."""
+class FittedBall:
+    """A candidate with its fit."""
 
     ball: Ball
     contrast_hu: float
@@ -68,10 +69,10 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
     InputError
         If the diameter is not positive, or too small for the voxels.
     """
-    _check_diameter(volume, ball_diameter_mm)
+    check_diameter(volume, ball_diameter_mm)
     radius = ball_diameter_mm / 2.0
     points, sizes = candidate_centers(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
-    fitted: list[_Fitted] = []
+    fitted: list[FittedBall] = []
     rejected: list[Rejected] = []
     count = 0
     for number, (point, size) in enumerate(zip(points, sizes, strict=True)):
@@ -91,12 +92,13 @@ def find_balls(volume: Volume, *, ball_diameter_mm: float, progress: Progress = 
     fitted, doubled = _apart(fitted, radius)
     fitted, odd = _alike(fitted)
     balls = tuple(sorted((f.ball for f in fitted), key=lambda b: tuple(b.center_mm[::-1])))
-    away = _distinct(rejected + doubled + odd, balls, radius)
+    away = distinct(rejected + doubled + odd, balls, radius)
     progress("fitting balls", 1.0)
     return BallSet(balls, away, _warnings(volume, balls, crowded=count > MOST_LOCAL))
 
 
-def _check_diameter(volume: Volume, diameter: float) -> None:
+def check_diameter(volume: Volume, diameter: float) -> None:
+    """Refuse a ball, diameter in mm, that is too small for the voxels to show its centre."""
     typical, thickest = float(np.median(volume.spacing_mm)), float(volume.spacing_mm.max())
     least = max(4.0 * typical, FEWEST_SLICES * thickest)
     if not np.isfinite(diameter) or diameter <= 0.0 or diameter < least:
@@ -111,7 +113,9 @@ def _check_diameter(volume: Volume, diameter: float) -> None:
         )
 
 
-def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted | Rejected | None:
+def _judge(
+    volume: Volume, point: NDArray[np.float64], radius: float
+) -> FittedBall | Rejected | None:
     """Fit one candidate and test it; None when nothing round is there."""
     reason = predicates.border_failure(volume, point, radius)
     if reason is not None:
@@ -120,7 +124,7 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
     rough = rough_fit(crop, point, radius)
     if rough is None or np.linalg.norm(rough.center_mm - point) > 0.8 * radius:
         return None
-    reasons = _shape(volume, rough, rough.radius_mm, radius, slack=ROUGH_SLACK)
+    reasons = shape_reasons(volume, rough, rough.radius_mm, radius, slack=ROUGH_SLACK)
     if reasons:
         return Rejected(rough.center_mm, "; ".join(reasons))
     rays = fine_fit(crop, rough, radius)
@@ -129,6 +133,25 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
     reason = predicates.border_failure(volume, rays.center_mm, radius)
     if reason is not None:
         return Rejected(rays.center_mm, reason)
+    return finished_fit(volume, crop, rays, radius)
+
+
+def finished_fit(
+    volume: Volume, crop: Crop, rays: RayFit, radius: float, *, despite: Sequence[str] | None = None
+) -> FittedBall | Rejected:
+    """The ball of a fine fit, if no test of its own speaks against it.
+
+    Parameters
+    ----------
+    volume : Volume
+    crop : Crop
+    rays : RayFit
+    radius : float
+        Nominal, mm.
+    despite : sequence of str, optional
+        Given for a ball that the user put there: the reasons met so far, which join those met
+        here among the ball's warnings, and none of which rejects it.
+    """
     clipped = rays.clipped_share > CLIPPED_CORE
     thick = float(volume.spacing_mm.max()) > THICK_SLICES_MM
     model = fit_model(
@@ -140,20 +163,24 @@ def _judge(volume: Volume, point: NDArray[np.float64], radius: float) -> _Fitted
         all_voxels=thick,
     )
     fitted = rays.radius_mm if model is None or clipped else model.radius_mm
-    reasons = _shape(volume, rays, fitted, radius)
+    reasons = shape_reasons(volume, rays, fitted, radius)
     reasons += [
         *predicates.model_failures(model, rays, thick=thick),
         *predicates.stem_failures(crop, rays, radius),
     ]
-    if reasons:
+    if reasons and despite is None:
         return Rejected(rays.center_mm, "; ".join(reasons))
     ball = _ball(rays, model, fitted, thick=thick)
-    return _Fitted(ball, rays.core_hu - rays.outside_hu)
+    if despite is not None:
+        although = [f"added by the user although: {why}" for why in (*despite, *reasons)]
+        ball = replace(ball, warnings=(*ball.warnings, *although), added=True)
+    return FittedBall(ball, rays.core_hu - rays.outside_hu)
 
 
-def _shape(
+def shape_reasons(
     volume: Volume, rays: RayFit, fitted: float, radius: float, slack: float = 1.0
 ) -> list[str]:
+    """Reasons of size and shape; `slack` as in `predicates.shape_failures`."""
     return list(
         predicates.shape_failures(volume, rays, fitted_mm=fitted, radius_mm=radius, slack=slack)
     )
@@ -189,9 +216,9 @@ def _ball(rays: RayFit, model: ModelFit | None, fitted: float, *, thick: bool) -
     )
 
 
-def _apart(fitted: list[_Fitted], radius: float) -> tuple[list[_Fitted], list[Rejected]]:
+def _apart(fitted: list[FittedBall], radius: float) -> tuple[list[FittedBall], list[Rejected]]:
     """One fit for each ball; of two that would overlap only the rounder one."""
-    kept: list[_Fitted] = []
+    kept: list[FittedBall] = []
     doubled: list[Rejected] = []
     for one in sorted(fitted, key=lambda f: f.ball.rms_residual_mm):
         gaps = [float(np.linalg.norm(one.ball.center_mm - k.ball.center_mm)) for k in kept]
@@ -204,7 +231,7 @@ def _apart(fitted: list[_Fitted], radius: float) -> tuple[list[_Fitted], list[Re
     return kept, doubled
 
 
-def _alike(fitted: list[_Fitted]) -> tuple[list[_Fitted], list[Rejected]]:
+def _alike(fitted: list[FittedBall]) -> tuple[list[FittedBall], list[Rejected]]:
     """Drop what is not of the others' material, where a clear majority agrees."""
     if len(fitted) < 3:
         return fitted, []
@@ -227,7 +254,7 @@ def _alike(fitted: list[_Fitted]) -> tuple[list[_Fitted], list[Rejected]]:
     return [f for f, ok in zip(fitted, same, strict=True) if ok], odd
 
 
-def _distinct(
+def distinct(
     rejected: list[Rejected], balls: tuple[Ball, ...], radius: float
 ) -> tuple[Rejected, ...]:
     """Rejected candidates that are neither on an accepted ball nor listed twice."""
