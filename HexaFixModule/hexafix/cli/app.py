@@ -19,6 +19,7 @@ from hexafix.cli.console import (
     quiet_libraries,
     report_error,
 )
+from hexafix.cli.execution_model import XML, Channel, execution_model_xml
 from hexafix.cli.serve import serve
 from hexafix.cli.study import study
 from hexafix.errors import HexaFixError
@@ -55,9 +56,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with quiet_libraries():
-            result = app(
-                tokens, result_action="return_value", exit_on_error=False, print_error=False
-            )
+            # Slicer asks for the XML without the arguments that planning needs.
+            result = _describe("plan") if tokens == ["plan", XML] else _run(tokens)
         code = result if isinstance(result, int) else 0
     except HexaFixError as error:
         code = report_error(error, as_json="--json" in tokens)
@@ -71,6 +71,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     except Exception as error:
         code = _defect(error)
     sys.exit(code)
+
+
+def _run(tokens: list[str]) -> object:
+    return app(tokens, result_action="return_value", exit_on_error=False, print_error=False)
+
+
+def _describe(command: str) -> int:
+    print(execution_model_xml(app, command), end="")
+    return 0
 
 
 def _defect(error: Exception) -> int:
@@ -228,9 +237,9 @@ def check_layout(
 
 @app.command
 def plan(
-    case: Annotated[Path, Parameter(help="The case file.")],
+    case: Annotated[Path, Parameter(help="The case file."), Channel("file", "input", ".json")],
     *,
-    out: Annotated[Path, Parameter(help="Folder for the export.")],
+    out: Annotated[Path, Parameter(help="Folder for the export."), Channel("directory", "output")],
     accept_relaxed_layout: Annotated[
         bool,
         Parameter(negative="", help="Accept a layout that keeps only the relaxed angle rule."),
@@ -245,8 +254,13 @@ def plan(
     ] = False,
     json: Json = False,
     quiet: Quiet = False,
+    xml: Annotated[
+        bool, Parameter(name=XML, negative="", help="Describe this command to Slicer; alone.")
+    ] = False,
 ) -> int:
     """Run the whole chain and write the export: plan, schedule, PDF, markers, manifest."""
+    if xml:
+        return _describe("plan")
     from hexafix.export import check_target
     from hexafix.report.picture import SceneRenderer
 
