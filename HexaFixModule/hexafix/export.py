@@ -76,6 +76,40 @@ def write_export(files: Mapping[str, bytes], folder: Path, *, private: bool = Fa
         ) from error
 
 
+def replace_file(path: Path, content: bytes) -> None:
+    """Put one file in place, all or nothing, with an export's care; an older one is replaced.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written (H46), or another writer is at work there (H47).
+    """
+    path = Path(os.path.abspath(path))  # noqa: PTH100 - a link as target stays a link
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _only_writer(path):
+            descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.staging-", dir=path.parent)
+            staging = Path(name)
+            try:
+                with os.fdopen(descriptor, "wb") as file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())
+                staging.chmod(0o666 & ~_umask())
+                staging.replace(path)
+                _sync_folder(path.parent)
+            finally:
+                staging.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError.of(
+            "file-not-written",
+            f"the file could not be written: {error.strerror}",
+            where="case file",
+            hazard="H46",
+            next_step="free disk space or choose another place; the older file is unchanged",
+        ) from error
+
+
 def check_target(folder: Path) -> None:
     """Refuse a target that holds anything but an older export.
 

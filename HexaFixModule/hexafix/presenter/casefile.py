@@ -1,0 +1,94 @@
+"""The case file on disk: opened as it is, saved whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hexafix.case.read import file_of_case
+from hexafix.errors import InputError
+from hexafix.export import replace_file
+from hexafix.presenter.history import Version, document_bytes
+from hexafix.strict_json import read_json_object
+
+
+def read_case_file(path: Path) -> tuple[Path, Version]:
+    """The case file's path and its content, complete or a draft.
+
+    Raises
+    ------
+    InputError
+        If it is no JSON object or no case file of a known version.
+    """
+    file = file_of_case(path).resolve()
+    raw, content = read_json_object(file, what="case file")
+    if not isinstance(content.get("schema_version"), int):
+        raise InputError.of(
+            "not-a-case",
+            "the file is not a case file",
+            where="case file",
+            next_step="open a case.json, or load an image into a new case",
+        )
+    return file, Version(raw, file.parent, label="open the case")
+
+
+def moved(version: Version, folder: Path) -> Version:
+    """The version as it reads in another folder: its relative paths lead to the same files."""
+    if version.folder == folder:
+        return version
+    document = version.copy()
+    image = document.get("image")
+    if isinstance(image, dict) and isinstance(image.get("path"), str):
+        image["path"] = _path_from(folder, version.folder, image["path"])
+    fixator = document.get("fixator")
+    if isinstance(fixator, str) and version.folder and (version.folder / fixator).is_file():
+        document["fixator"] = _path_from(folder, version.folder, fixator)
+    raw = version.raw if document == version.content else document_bytes(document)
+    return Version(raw, folder, version.relaxed, version.label)
+
+
+def path_in(folder: Path | None, path: Path) -> str:
+    """A path as a case in `folder` holds it: relative to it where that is possible."""
+    return _path_from(folder, None, str(path)) if folder else str(path)
+
+
+def _path_from(folder: Path, old: Path | None, given: str) -> str:
+    whole = (old / given if old else Path(given)).resolve()
+    try:
+        return Path(os.path.relpath(whole, folder)).as_posix()
+    except ValueError:  # another drive
+        return str(whole)
+
+
+def write_case_file(path: Path, raw: bytes, *, expected: bytes | None) -> None:
+    """Write a case file whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    raw : bytes
+    expected : bytes or None
+        What the file held when this program last read or wrote it; None for a file of its own
+        choice that the user was asked about.
+
+    Raises
+    ------
+    InputError
+        If somebody else has changed the file meanwhile (H47), or it cannot be written (H46).
+    """
+    if expected is not None and path.exists() and path.read_bytes() != expected:
+        raise InputError.of(
+            "case-changed-on-disk",
+            "the case file was changed by another program since it was opened",
+            where="case file",
+            hazard="H47",
+            next_step="save under another name, then compare both",
+        )
+    replace_file(path, raw)
+
+
+def no_name() -> InputError:
+    """The error of a case that was never saved."""
+    return InputError.of(
+        "no-name", "the case has no file yet", next_step="choose where the case is saved"
+    )

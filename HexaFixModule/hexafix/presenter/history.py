@@ -1,0 +1,93 @@
+"""The versions of the case document: undo and redo by the raw bytes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from hexafix.strict_json import parse_json_object
+
+
+@dataclass(frozen=True)
+class Version:
+    """The case at one moment: everything that undo brings back.
+
+    Attributes
+    ----------
+    raw : bytes
+        The case document as read or as it would be written.
+    folder : Path or None
+        What relative paths in it are relative to; None for a case never saved.
+    relaxed : bool
+        Whether the relaxed angle rule is accepted (H17); not part of the case file.
+    label : str
+        The edit that made this version.
+    """
+
+    raw: bytes
+    folder: Path | None = None
+    relaxed: bool = False
+    label: str = ""
+
+    @cached_property
+    def content(self) -> Mapping[str, Any]:
+        """The document; do not change it."""
+        return parse_json_object(self.raw, what="case file", where="case.json")
+
+    def copy(self) -> dict[str, Any]:
+        """The document as a copy to be changed."""
+        return json.loads(self.raw)
+
+
+def document_bytes(document: Mapping[str, Any]) -> bytes:
+    """An edited document as it is written; ValueError or TypeError if it is not JSON."""
+    return (json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+class History:
+    """The present version, those before it and those undone."""
+
+    def __init__(self, present: Version) -> None:
+        self._past: list[Version] = []
+        self._future: list[Version] = []
+        self.present = present
+
+    def edit(self, version: Version) -> None:
+        """Make `version` the present; what was undone is forgotten."""
+        self._past.append(self.present)
+        self._future.clear()
+        self.present = version
+
+    def replace(self, version: Version) -> None:
+        """Another present at the same place, as saving elsewhere makes it."""
+        self.present = version
+
+    def undo(self) -> bool:
+        """Back by one edit; False if there is none."""
+        if not self._past:
+            return False
+        self._future.append(self.present)
+        self.present = self._past.pop()
+        return True
+
+    def redo(self) -> bool:
+        """Forward by one undone edit; False if there is none."""
+        if not self._future:
+            return False
+        self._past.append(self.present)
+        self.present = self._future.pop()
+        return True
+
+    @property
+    def undo_label(self) -> str:
+        """The edit that undo takes back, or empty."""
+        return self.present.label if self._past else ""
+
+    @property
+    def redo_label(self) -> str:
+        """The edit that redo brings back, or empty."""
+        return self._future[-1].label if self._future else ""
