@@ -73,7 +73,7 @@ LIBRARIES = {
     "case": {"numpy", "pydantic"},
     "gates": {"numpy"},
     "export": set(),
-    "report": {"numpy", "scipy", "typst", "vtkmodules"},
+    "report": {"numpy", "scipy", "typst", "vtkmodules", "pypdfium2"},
     "verify": {"numpy", "scipy", "pypdfium2"},
     "selftest": {"numpy", "scipy"},
     "pipeline": {"numpy", "scipy"},

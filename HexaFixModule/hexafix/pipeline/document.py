@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hexafix.case import Case
+from hexafix.imaging import Volume
 from hexafix.markers import BallSet
 from hexafix.pipeline.numbers import covariance_document, pose_document, rounded
 from hexafix.pipeline.recognised import Recognised
@@ -80,6 +81,7 @@ def _ball(ball: Any) -> dict[str, Any]:
         "core_hu": rounded(ball.core_hu, 1),
         "method": ball.method,
         "warnings": list(ball.warnings),
+        **({"added": True} if ball.added else {}),
     }
 
 
@@ -93,7 +95,15 @@ def _numbered_balls(case: Case, recognised: Recognised) -> list[dict[str, Any]]:
 
 
 def _image(recognised: Recognised) -> dict[str, Any]:
-    volume = recognised.volume
+    source = recognised.volume.source
+    return {
+        **image_content(recognised.volume),
+        "warnings": [*source.warnings, *recognised.balls.warnings],
+    }
+
+
+def image_content(volume: Volume) -> dict[str, Any]:
+    """What an image is, without its warnings."""
     acquired = volume.source.acquisition
     return {
         "frame": "LPS",
@@ -104,7 +114,6 @@ def _image(recognised: Recognised) -> dict[str, Any]:
         "ijk_to_lps": rounded(volume.ijk_to_lps, 9),
         "resampled": acquired is not None,
         "gantry_tilt_deg": None if acquired is None else rounded(acquired.tilt_deg, 4),
-        "warnings": [*volume.source.warnings, *recognised.balls.warnings],
     }
 
 

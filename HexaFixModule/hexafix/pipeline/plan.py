@@ -26,6 +26,7 @@ from hexafix.correction.targets import planned_motion
 from hexafix.errors import HexaFixError, LayoutRejected
 from hexafix.geometry import Pose
 from hexafix.imaging import Volume
+from hexafix.markers import BallSet
 from hexafix.pipeline.recognise import read_case_image, recognise
 from hexafix.pipeline.recognised import Recognised
 from hexafix.pipeline.strut_witness import WeighedStruts, weigh_struts
@@ -101,10 +102,18 @@ def recognise_checked(
     case: Case,
     *,
     volume: Volume | None = None,
+    balls: BallSet | None = None,
     accept_relaxed_layout: bool = False,
     progress: Progress = silent,
 ) -> Recognised:
     """The first half of `plan_correction`: the layout's rules, the image, the poses, their gates.
+
+    Parameters
+    ----------
+    case, volume, accept_relaxed_layout, progress
+        As in `plan_correction`.
+    balls : BallSet, optional
+        As in `recognise`.
 
     Raises
     ------
@@ -117,7 +126,7 @@ def recognise_checked(
         raise LayoutRejected(*faults)
     if volume is None:
         volume = read_case_image(case, progress=progress)
-    recognised = recognise(case, volume, progress=progress)
+    recognised = recognise(case, volume, balls=balls, progress=progress)
     gates.decide(recognised.gates)
     return recognised
 

@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hexafix import gates
 from hexafix.case import Case
-from hexafix.hardware import MarkerLayout
+from hexafix.hardware import Fixator, MarkerLayout
 from hexafix.imaging import Volume, read_volume
 from hexafix.kinematics import strut_lengths
 from hexafix.markers import BallSet, find_balls
 from hexafix.pipeline import document
+from hexafix.pipeline.look import find_case_balls
 from hexafix.pipeline.recognised import Recognised
 from hexafix.progress import Progress, silent
 from hexafix.recognition import (
@@ -28,6 +30,9 @@ from hexafix.recognition import (
     ring_pose,
     ring_pose_by_groups,
 )
+
+StrutJudge = Callable[[RingPose, RingPose], float]
+"""RMS difference in mm between strut lengths of two ring poses (proximal, distal) and readings."""
 
 
 def find_markers(
@@ -50,13 +55,30 @@ def read_case_image(case: Case, *, progress: Progress = silent) -> Volume:
     )
 
 
-def recognise(case: Case, volume: Volume, *, progress: Progress = silent) -> Recognised:
+def case_balls(case: Case, volume: Volume, *, progress: Progress = silent) -> BallSet:
+    """The case's balls in its image, with the user's corrections."""
+    edits = case.marker_edits
+    return find_case_balls(
+        volume,
+        ball_diameter_mm=case.ball_diameter_mm,
+        added_lps_mm=edits.added_lps_mm,
+        removed_lps_mm=edits.removed_lps_mm,
+        progress=progress,
+    )
+
+
+def recognise(
+    case: Case, volume: Volume, *, balls: BallSet | None = None, progress: Progress = silent
+) -> Recognised:
     """Find, number and locate; the gates are computed, not yet decided.
 
     Parameters
     ----------
     case : Case
+        Its corrections of the balls are followed.
     volume : Volume
+    balls : BallSet, optional
+        What `case_balls` gave for this case and volume; then they are not searched again.
     progress : Progress, optional
 
     Raises
@@ -64,7 +86,8 @@ def recognise(case: Case, volume: Volume, *, progress: Progress = silent) -> Rec
     MarkersNotFound, NumberingAmbiguous, ImageRefused, LayoutRejected
         As the steps find them.
     """
-    balls = find_balls(volume, ball_diameter_mm=case.ball_diameter_mm, progress=progress)
+    if balls is None:
+        balls = case_balls(case, volume, progress=progress)
     progress("number the balls", 0.0)
     numbering = _number(case, balls)
     progress("number the balls", 1.0)
@@ -87,6 +110,7 @@ def recognise(case: Case, volume: Volume, *, progress: Progress = silent) -> Rec
         poses["distal", ring_pose_by_groups],
         mechanism,
         _gates(case, volume, balls, numbering, proximal, distal, mechanism),
+        case.fixator,
     )
 
 
@@ -110,20 +134,29 @@ def _number(case: Case, balls: BallSet) -> Numbering:
             dict(case.numbering), centers, proximal=case.proximal, distal=case.distal
         )
     return number_balls(
-        centers, proximal=case.proximal, distal=case.distal, judge=_strut_judge(case)
+        centers,
+        proximal=case.proximal,
+        distal=case.distal,
+        judge=judge_by_struts(case.fixator, case.strut_readings_mm),
     )
 
 
-def _strut_judge(case: Case) -> Callable[[RingPose, RingPose], float] | None:
-    """RMS of the CT's strut lengths against the readings, for a choice of ring poses."""
-    readings = case.strut_readings_mm
-    if readings is None:
+def judge_by_struts(fixator: Fixator | None, readings_mm: ArrayLike | None) -> StrutJudge | None:
+    """RMS of the CT's strut lengths against the readings, for a choice of ring poses.
+
+    Parameters
+    ----------
+    fixator : Fixator or None
+    readings_mm : array_like, shape (6,), or None
+        Scale readings, mm; without fixator or readings there is no judge.
+    """
+    if fixator is None or readings_mm is None:
         return None
-    lengths = readings + case.fixator.strut.scale_offset_mm
+    known, lengths = fixator, np.asarray(readings_mm, float) + fixator.strut.scale_offset_mm
 
     def judge(proximal: RingPose, distal: RingPose) -> float:
         pose = distal.pose.inverse() @ proximal.pose
-        return float(np.sqrt(np.mean((strut_lengths(pose, case.fixator) - lengths) ** 2)))
+        return float(np.sqrt(np.mean((strut_lengths(pose, known) - lengths) ** 2)))
 
     return judge
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hexafix.gates import Gate
+from hexafix.hardware import Fixator
 from hexafix.imaging import Volume
 from hexafix.markers import BallSet
 from hexafix.recognition import MechanismPose, Numbering, RingPose
@@ -27,6 +28,7 @@ class Recognised:
         X_r, {A} in {B}.
     gates : tuple of Gate
         G2 to G5, G7 and the side, decided or not.
+    fixator : Fixator
     """
 
     volume: Volume
@@ -38,3 +40,4 @@ class Recognised:
     distal_by_groups: RingPose
     mechanism: MechanismPose
     gates: tuple[Gate, ...]
+    fixator: Fixator

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix import gates
-from hexafix.case import Case
+from hexafix.case import Case, ScheduleRules
 from hexafix.correction import (
     Compensation,
     RecognisedRings,
@@ -129,19 +129,8 @@ def weigh_struts(case: Case, recognised: Recognised) -> WeighedStruts:
     gates.decide([agree])
     forward = forward_kinematics(lengths, case.fixator, start=seen)
     basin = second_starts(lengths, case.fixator, solution=forward.pose)
-    resolution = reading_resolution_mm(readings, step_mm=case.schedule.strut_step_mm)
-    compensation = compensate(
-        RecognisedRings(
-            proximal=recognised.proximal.pose,
-            distal=recognised.distal.pose,
-            proximal_covariance=recognised.proximal.covariance,
-            distal_covariance=recognised.distal.covariance,
-        ),
-        theoretical=forward.pose,
-        mode=case.schedule.compensation,
-        theoretical_covariance=reading_covariance(
-            forward.pose, case.fixator, resolution_mm=resolution
-        ),
+    resolution, compensation = bring_together(
+        case, recognised, case.schedule, readings_mm=readings, theoretical=forward.pose
     )
     found = (
         agree,
@@ -150,3 +139,41 @@ def weigh_struts(case: Case, recognised: Recognised) -> WeighedStruts:
     )
     gates.decide(found)
     return WeighedStruts(witness, forward, basin, resolution, compensation, found)
+
+
+def bring_together(
+    case: Case,
+    recognised: Recognised,
+    rules: ScheduleRules,
+    *,
+    readings_mm: NDArray,
+    theoretical: Pose,
+) -> tuple[float, Compensation]:
+    """How finely the readings were given, mm, and image and readings brought together.
+
+    Parameters
+    ----------
+    case : Case
+    recognised : Recognised
+    rules : ScheduleRules
+        Tells the struts' step and how to compensate.
+    readings_mm : ndarray, shape (6,)
+        Scale readings, mm.
+    theoretical : Pose
+        X_t from the readings, {A} in {B}.
+    """
+    resolution = reading_resolution_mm(readings_mm, step_mm=rules.strut_step_mm)
+    compensation = compensate(
+        RecognisedRings(
+            proximal=recognised.proximal.pose,
+            distal=recognised.distal.pose,
+            proximal_covariance=recognised.proximal.covariance,
+            distal_covariance=recognised.distal.covariance,
+        ),
+        theoretical=theoretical,
+        mode=rules.compensation,
+        theoretical_covariance=reading_covariance(
+            theoretical, case.fixator, resolution_mm=resolution
+        ),
+    )
+    return resolution, compensation
