@@ -5,3 +5,8 @@ a VNavigationDrawer of about 470 px), ``.playback()`` (inside a VFooter under th
 ``.dialogs()`` (anywhere in the layout) builds it; ``.update(snapshot)`` pushes a snapshot;
 ``.ball_clicked(index)`` takes a click in a view.
 """
+
+from hexafix.web.panel.controls import NoViews, ViewControls
+from hexafix.web.panel.panel import Panel
+
+__all__ = ["NoViews", "Panel", "ViewControls"]

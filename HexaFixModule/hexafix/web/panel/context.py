@@ -1,0 +1,134 @@
+"""What every part of the side panel works with: the presenter, the typed state, the views."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hexafix.errors import HexaFixError, InputError
+from hexafix.web.panel.controls import ViewControls
+
+if TYPE_CHECKING:
+    from hexafix.presenter import Presenter
+    from hexafix.web.state import PanelState
+
+_NUMBER = re.compile(r"[+-]?[0-9]{1,6}(\.[0-9]{1,9})?")
+
+
+@dataclass(frozen=True)
+class PanelContext:
+    """Presenter, state and views, and the one way to act on the presenter.
+
+    Attributes
+    ----------
+    server : trame server
+    presenter : Presenter
+    controls : ViewControls
+    data : PanelState
+        The state's values; setting one sends it to the browser.
+    name : PanelState
+        The state's names, for templates.
+    """
+
+    server: Any
+    presenter: Presenter
+    controls: ViewControls
+    data: PanelState
+    name: PanelState
+
+    def act(self, work: Callable[[], Any], *, field: str | None = None) -> bool:
+        """Do `work`; an error is shown at `field`, or as a notice. Whether it was taken.
+
+        The presenter's own actions tell their errors as banners and return False.
+        """
+        try:
+            if work() is False:
+                self._mark_refused(field)
+                return False
+        except HexaFixError as error:
+            self.tell(error, field=field)
+            return False
+        self.forgive(field)
+        return True
+
+    def _mark_refused(self, field: str | None) -> None:
+        self.data.notice = {}
+        if field is not None:
+            banners = self.presenter.snapshot.banners
+            words = f"not taken: {banners[0].message}" if banners else "not taken"
+            self.data.field_errors = {**self.data.field_errors, field: words}
+
+    def tell(self, error: HexaFixError, *, field: str | None = None) -> None:
+        """Show an error: the text of a field stays, marked as not taken."""
+        fault = error.faults[0]
+        if field is not None:
+            words = f"not taken: {fault.what}"
+            if fault.limit:
+                words += f" ({fault.limit})"
+            self.data.field_errors = {**self.data.field_errors, field: words}
+            return
+        self.data.notice = {
+            "message": "; ".join(f.message.partition(". Next step: ")[0] for f in error.faults[:3]),
+            "next_step": fault.next_step or "",
+            "hazard": fault.hazard or "",
+            "code": fault.code,
+        }
+
+    def forgive(self, field: str | None = None) -> None:
+        """Take back a notice and the marks of fields whose text was not taken.
+
+        Every marked field but `field` is built anew, so that it shows the document's value again.
+        """
+        self.data.notice = {}
+        marked = self.data.field_errors
+        if marked:
+            keys = dict(self.data.field_keys)
+            for name in marked:
+                keys[name] = keys.get(name, 0) + (name != field)
+            self.data.field_keys = keys
+            self.data.field_errors = {}
+
+
+def number(text: Any, *, where: str) -> float:
+    """The number that a field holds: a decimal point, no comma, no unit, no sign but + or -.
+
+    Raises
+    ------
+    InputError
+        If the text is not a plain number (H26).
+    """
+    text = str("" if text is None else text).strip().replace("−", "-")
+    if not _NUMBER.fullmatch(text):
+        raise InputError.of(
+            "not-a-number",
+            "this is not a plain number",
+            value=text[:20] or "nothing",
+            limit="digits with a decimal point, e.g. 182.5",
+            where=where,
+            hazard="H26",
+            next_step="write it with a decimal point and without a unit",
+        )
+    return float(text)
+
+
+def whole_number(text: Any, *, where: str) -> int:
+    """The whole number that a field holds.
+
+    Raises
+    ------
+    InputError
+        If the text is not digits alone.
+    """
+    text = str("" if text is None else text).strip()
+    if not (text.isascii() and text.isdigit() and len(text) < 5):
+        raise InputError.of(
+            "not-a-whole-number",
+            "this is not a whole number",
+            value=text[:20] or "nothing",
+            limit="digits alone",
+            where=where,
+            next_step="write digits alone",
+        )
+    return int(text)

@@ -1,0 +1,214 @@
+"""The correction day by day: slider, play, strut values with their turns, curves."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.struts import badge
+from hexafix.web.panel.widgets import icon_button, marked
+from hexafix.web.state import NAMESPACE
+
+if TYPE_CHECKING:
+    from hexafix.presenter import Snapshot
+
+STEP_S = 0.35
+"""Time between two adjustments while playing."""
+
+
+@dataclass
+class PlaybackState:
+    """One row of the schedule as it is shown.
+
+    Attributes
+    ----------
+    row, last : int
+        The shown row and the last one; row 0 is today.
+    struts : list of dict
+        value, turn, way (``longer``, ``shorter`` or nothing), arrow.
+    """
+
+    shown: bool = False
+    fresh: bool = True
+    row: int = 0
+    last: int = 0
+    playing: bool = False
+    when: str = ""
+    struts: list = field(default_factory=list)
+
+
+class Playback:
+    """Moves frame and bone through the plan."""
+
+    def __init__(self, context: PanelContext) -> None:
+        from trame_server.utils.typed_state import TypedState
+
+        self._context = context
+        typed = TypedState(context.server.state, PlaybackState, namespace=NAMESPACE)
+        self._data, self._name = typed.data, typed.name
+        self._typed = typed
+        self._playback: Any = None
+        self._rows: tuple[tuple[str, ...], ...] = ()
+        self._task: asyncio.Task | None = None
+
+    def build(self) -> None:
+        """Make the bar under the views."""
+        from trame.widgets import html
+        from trame.widgets import vuetify3 as v
+
+        name = self._name
+        with html.Div(
+            v_if=name.shown,
+            classes=(f"['hx-playback', {name.fresh} ? '' : 'hx-stale']",),
+            **marked("playback", label="Playback of the correction", data_row=(name.row,)),
+        ):
+            with html.Div(classes="hx-row hx-playback-bar"):
+                icon_button("mdi-skip-backward", "Today", "play-first", (self._go, "[0]"))
+                icon_button("mdi-chevron-left", "Adjustment before", "play-back", self._back)
+                icon_button(
+                    (f"{name.playing} ? 'mdi-pause' : 'mdi-play'",),
+                    (f"{name.playing} ? 'Pause' : 'Play'",),
+                    "play",
+                    self._toggle,
+                )
+                icon_button("mdi-chevron-right", "Next adjustment", "play-next", self._next)
+                v.VSlider(
+                    model_value=(name.row,),
+                    update_modelValue=(self._go, "[$event]"),
+                    min=0,
+                    max=(name.last,),
+                    step=1,
+                    density="compact",
+                    hide_details=True,
+                    color="primary",
+                    classes="hx-slider",
+                    **marked("play-slider", label="Adjustment of the plan"),
+                )
+                html.Span(
+                    f"{{{{ {name.when} }}}}",
+                    classes="hx-when",
+                    **marked("play-when", role="status"),
+                )
+            with (
+                html.Div(classes="hx-cells"),
+                html.Div(
+                    v_for=f"(strut, i) in {name.struts}",
+                    key="i",
+                    classes="hx-cell",
+                    **marked(("'play-strut-' + (i + 1)",)),
+                ),
+            ):
+                badge("i")
+                html.Span(
+                    "{{ strut.value }}", classes="hx-value", **marked(("'play-value-' + (i + 1)",))
+                )
+                html.Span("mm", classes="hx-unit")
+                html.Span(
+                    "{{ strut.arrow }} {{ strut.turn }} {{ strut.way }}",
+                    classes=("'hx-turn hx-' + strut.way",),
+                    **marked(("'play-turn-' + (i + 1)",)),
+                )
+
+    def update(self, snapshot: Snapshot, playback: Any, fresh: bool) -> None:
+        """Take a new plan; the shown row stays where the plan is the same.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+        playback : Playback or None
+            The pipeline's rows with their poses.
+        fresh : bool
+            Whether the plan is of the present inputs.
+        """
+        table = snapshot.tables.get("strut_plan")
+        self._data.fresh = fresh
+        if playback is self._playback:
+            return
+        self._stop()
+        self._playback = playback
+        self._rows = table.rows if table and playback else ()
+        self._data.shown = bool(self._rows)
+        self._data.last = max(len(self._rows) - 1, 0)
+        if self._rows:
+            self._show(0, views=False)
+        self._context.controls.show_playback_row(None)
+
+    def close(self) -> None:
+        """Stop playing."""
+        self._stop()
+
+    def _show(self, row: int, *, views: bool = True) -> None:
+        from hexafix.pipeline import format_change
+
+        words = self._rows[row][3:]
+        before = self._rows[max(row - 1, 0)][3:]
+        turned = self._playback.rows[row].turned_mm
+        self._data.row = row
+        self._data.when = when_words(self._rows[row], self._rows[-1][0])
+        self._data.struts = [
+            {"value": value, **turn_words(float(by), change)}
+            for value, by, change in zip(words, turned, format_change(before, words), strict=True)
+        ]
+        if views:
+            self._context.controls.show_playback_row(row)
+
+    def _go(self, row: float) -> None:
+        if self._rows and 0 <= row <= self._data.last:
+            self._show(int(row))
+
+    def _next(self) -> None:
+        self._go(self._data.row + 1)
+
+    def _back(self) -> None:
+        self._go(self._data.row - 1)
+
+    def _toggle(self) -> None:
+        if self._data.playing:
+            self._stop()
+            return
+        if self._data.row == self._data.last:
+            self._show(0)
+        self._data.playing = True
+        self._task = asyncio.get_running_loop().create_task(self._play())
+
+    async def _play(self) -> None:
+        state = self._context.server.state
+        while self._data.row < self._data.last:
+            await asyncio.sleep(STEP_S)
+            with state:
+                self._next()
+        with state:
+            self._data.playing = False
+
+    def _stop(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+        self._data.playing = False
+
+
+def when_words(row: tuple[str, ...], days: str) -> str:
+    """Day, date and adjustment of a row of the schedule."""
+    day, date, adjustment = row[:3]
+    if day == "0":
+        return f"today: the readings, before day 1 ({date})"
+    return f"day {day} of {days} · {date} · adjustment {adjustment}"
+
+
+def turn_words(turned: float, change: str) -> dict[str, str]:
+    """How a strut is turned, in a word and an arrow beside the amount (H42).
+
+    Parameters
+    ----------
+    turned : float
+        Its sign alone is read.
+    change : str
+        The amount without sign.
+    """
+    if turned > 0:
+        return {"turn": change, "way": "longer", "arrow": "▲"}
+    if turned < 0:
+        return {"turn": change, "way": "shorter", "arrow": "▼"}
+    return {"turn": "", "way": "", "arrow": "·"}

@@ -1,0 +1,171 @@
+"""The bar on top: the case, undo and redo with their words, progress and cancel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hexafix.web.files import CASE_SUFFIXES
+from hexafix.web.panel.chooser import Chooser
+from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.widgets import button, icon_button, marked
+from hexafix.web.state import NAMESPACE
+
+NOTICE = "Research software. Not a medical device. Plans are not approved."
+"""Always on screen."""
+
+
+@dataclass
+class ToolbarState:
+    """Whether the user is asked before unsaved edits are lost, and for what."""
+
+    asking: bool = False
+
+
+class Toolbar:
+    """Case file, undo and redo, progress."""
+
+    def __init__(self, context: PanelContext, chooser: Chooser) -> None:
+        from trame_server.utils.typed_state import TypedState
+
+        self._context, self._chooser = context, chooser
+        typed = TypedState(context.server.state, ToolbarState, namespace=NAMESPACE)
+        self._data, self._name = typed.data, typed.name
+        context.server.trigger("hx_undo")(self.undo)
+        context.server.trigger("hx_redo")(self.redo)
+
+    def build(self) -> None:
+        """Make the bar's content, inside a VAppBar."""
+        from trame.widgets import html
+        from trame.widgets import vuetify3 as v
+
+        name = self._context.name
+        with html.Div(classes="hx-brand", **marked("brand")):
+            html.Span("HexaFix", classes="hx-logo")
+            with html.Span(classes="hx-case", **marked("case-id")):
+                html.Span(f"{{{{ {name.case_id} || 'no case' }}}}")
+                html.Span("not saved", v_if=name.edited, classes="hx-unsaved", **marked("unsaved"))
+        with html.Div(classes="hx-row", role="group"):
+            icon_button("mdi-folder-open-outline", "Open a case", "open-case", self.open_case)
+            save = f"{name.case_path} ? 'Save the case' : 'Save the case as a file'"
+            icon_button("mdi-content-save-outline", (save,), "save-case", self.save)
+            icon_button(
+                "mdi-content-save-edit-outline", "Save the case as", "save-as", self.save_as
+            )
+        v.VDivider(vertical=True, inset=True, classes="mx-1")
+        for word, icon in (("undo", "mdi-undo"), ("redo", "mdi-redo")):
+            can, label = getattr(name, f"can_{word}"), getattr(name, f"{word}_label")
+            says = f"{can} ? '{word.capitalize()}: ' + {label} : 'Nothing to {word}'"
+            click = self.undo if word == "undo" else self.redo
+            icon_button(icon, (says,), word, click, disabled=(f"!{can} || {name.busy}",))
+        html.Span(
+            f"{{{{ {name.undo_label} }}}}",
+            v_if=name.can_undo,
+            classes="hx-undo-label",
+            **marked("undo-label"),
+        )
+        v.VSpacer()
+        self._progress()
+        button(
+            "Plan all steps",
+            "run-all",
+            self._context.presenter.run_all,
+            icon="mdi-play",
+            primary=True,
+            v_if=f"!{name.busy}",
+        )
+        html.Span(NOTICE, classes="hx-notice", **marked("notice", role="note"))
+
+    def _progress(self) -> None:
+        from trame.widgets import html
+        from trame.widgets import vuetify3 as v
+
+        name = self._context.name
+        with html.Div(v_if=name.busy, classes="hx-progress", **marked("progress", role="status")):
+            html.Span(f"{{{{ {name.progress_text} || 'working' }}}}", classes="hx-progress-text")
+            v.VProgressLinear(
+                model_value=(name.progress_percent,),
+                color="primary",
+                height=6,
+                rounded=True,
+                **marked("progress-bar", label="Progress of the step"),
+            )
+        button(
+            "Cancel",
+            "cancel",
+            self._context.presenter.cancel,
+            icon="mdi-stop",
+            v_if=name.busy,
+        )
+
+    def undo(self) -> None:
+        """Take the last edit back."""
+        context = self._context
+        if context.presenter.snapshot.can_undo:
+            context.act(context.presenter.undo)
+
+    def redo(self) -> None:
+        """Make the edit again that was taken back."""
+        context = self._context
+        if context.presenter.snapshot.can_redo:
+            context.act(context.presenter.redo)
+
+    def open_case(self) -> None:
+        """Ask for a case file, and before that whether unsaved edits may be lost."""
+        if self._context.presenter.snapshot.edited:
+            self._data.asking = True
+        else:
+            self._choose_case()
+
+    def _choose_case(self) -> None:
+        self._data.asking = False
+        context = self._context
+        self._chooser.ask(
+            "Open a case",
+            "Open",
+            lambda path: context.act(lambda: context.presenter.open_case(path)),
+            suffixes=CASE_SUFFIXES,
+            hint="A case file (case.json).",
+        )
+
+    def new_case(self) -> None:
+        """Start with an empty case, if nothing unsaved is lost by it."""
+        self._context.act(self._context.presenter.new_case)
+
+    def save(self) -> None:
+        """Save where the case came from, else ask."""
+        context, path = self._context, self._context.presenter.snapshot.case_path
+        if path:
+            context.act(lambda: context.presenter.save_case(Path(path)))
+        else:
+            self.save_as()
+
+    def save_as(self) -> None:
+        """Ask where to save."""
+        context = self._context
+        self._chooser.ask(
+            "Save the case as",
+            "Save",
+            lambda path: context.act(lambda: context.presenter.save_case(path)),
+            suffixes=CASE_SUFFIXES,
+            name="case.json",
+            hint="The case is saved as a draft or complete, with the image's place beside it.",
+        )
+
+    def build_dialog(self) -> None:
+        """Make the question before unsaved edits are lost."""
+        from trame.widgets import vuetify3 as v
+
+        with (
+            v.VDialog(v_model=(self._name.asking,), max_width=440),
+            v.VCard(**marked("ask-unsaved", label="Edits are not saved")),
+        ):
+            v.VCardTitle("Edits are not saved", classes="text-subtitle-1 font-weight-bold")
+            v.VCardText("Another case is opened and the edits of this one are lost.")
+            with v.VCardActions():
+                v.VSpacer()
+                button("Keep this case", "ask-keep", self._keep)
+                button("Open another", "ask-open", self._choose_case, primary=True)
+
+    def _keep(self) -> None:
+        self._data.asking = False
