@@ -65,8 +65,10 @@ class Workstation:
         self.logic = SceneLogic(self.app.scene, app_logic=self.app.app_logic)
         self.sync = SceneSync(self.logic, self.presenter)
         self.state.trame__title = TITLE
-        self.views = Views(self)
+        self.views = Views(self.server, self.app, self.presenter, self.logic)
         self.panel = Panel(self.server, self.presenter, self.views)
+        self.views.ball_clicked = self.panel.ball_clicked
+        self.views.act = self.panel.act
         self._build_page()
         self.presenter.changed.connect(self._show)
         self._show(self.presenter.snapshot)
@@ -85,6 +87,7 @@ class Workstation:
     def close(self) -> None:
         """Stop the presenter's work and let go of the scene."""
         self.presenter.changed.disconnect(self._show)
+        self.panel.close()
         self.presenter.close()
         self.views.close()
 

@@ -1,0 +1,130 @@
+"""The layouts of the views and what lies over each view: name, position, patient letters, slider.
+
+The views keep Slicer's own tags (Red, Green, Yellow), so that a saved scene opens there too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+FOUR = "four"
+"""Layout of all four views."""
+
+NAMES = {
+    FOUR: "Four views",
+    "axial": "Axial",
+    "coronal": "Coronal",
+    "sagittal": "Sagittal",
+    "space": "3D",
+    "axial-space": "Axial and 3D",
+}
+"""Layout and its name in the menu."""
+
+VIEW_NAMES = {"Red": "Axial", "Green": "Coronal", "Yellow": "Sagittal", "ThreeD": "3D"}
+"""Tag of a view and its name for people."""
+
+EDGES = ("left", "right", "top", "bottom")
+
+STYLE = """
+html { overflow: hidden; }
+.hx-views-bar { display: flex; align-items: center; gap: 10px; padding: 6px 10px;
+  flex-wrap: wrap; }
+.hx-gap { width: 6px; }
+.hx-hint { color: #ffe082; font-weight: 600; }
+.hx-aim, .hx-aim * { cursor: crosshair !important; }
+.hx-over { position: absolute; pointer-events: none; color: #ffffff; user-select: none;
+  text-shadow: 0 0 3px #000, 0 0 3px #000; font-size: 14px; line-height: 1.25; }
+.hx-name { top: 6px; left: 10px; }
+.hx-edge { font-size: 18px; font-weight: 700; color: #ffe082; }
+.hx-left { left: 8px; top: 50%; transform: translateY(-50%); }
+.hx-right { right: 8px; top: 50%; transform: translateY(-50%); }
+.hx-top { top: 4px; left: 50%; transform: translateX(-50%); }
+.hx-bottom { bottom: 34px; left: 50%; transform: translateX(-50%); }
+.hx-slider { position: absolute; bottom: 0; left: 8px; right: 8px; }
+.hx-reset { position: absolute; top: 2px; right: 2px; }
+.hx-note { position: absolute; top: 50%; left: 0; right: 0; text-align: center; color: #bdbdbd;
+  pointer-events: none; font-size: 16px; }
+"""
+"""Style of what lies over the views; white on a dark rim is legible on bone and on air."""
+
+
+def grid() -> dict[str, Any]:
+    """The layouts by id."""
+    from trame_slicer.views import Layout, LayoutDirection, ViewLayoutDefinition
+
+    axial = ViewLayoutDefinition.axial_view()
+    coronal = ViewLayoutDefinition.coronal_view()
+    sagittal = ViewLayoutDefinition.sagittal_view()
+    space = ViewLayoutDefinition.threed_view(background_color=("#20252b", "#3a424b"))
+    across, down = LayoutDirection.Horizontal, LayoutDirection.Vertical
+    return {
+        FOUR: Layout(down, [Layout(across, [axial, space]), Layout(across, [coronal, sagittal])]),
+        "axial": Layout(down, [axial]),
+        "coronal": Layout(down, [coronal]),
+        "sagittal": Layout(down, [sagittal]),
+        "space": Layout(down, [space]),
+        "axial-space": Layout(across, [axial, space]),
+    }
+
+
+def state_name(view_id: str, what: str) -> str:
+    """Name of a view's own state, e.g. ``Red_position``."""
+    return f"{view_id}_{what}"
+
+
+def over_slice(server: Any, view_id: str, view: Any) -> None:
+    """What lies over a slice view; it follows the slice."""
+    from trame.widgets import html
+    from trame_slicer.app.logic.slice_view_logic import connect_slice_view_slider_to_state
+    from trame_slicer.app.ui.slider import Slider
+
+    for what in ("position", *EDGES):
+        server.state.setdefault(state_name(view_id, what), "")
+    with html.Div(classes="hx-over hx-name"):
+        html.Div(VIEW_NAMES[view.get_singleton_tag()], style="font-weight: 600;")
+        html.Div(f"{{{{ {state_name(view_id, 'position')} }}}}")
+    for edge in EDGES:
+        html.Div(f"{{{{ {state_name(view_id, edge)} }}}}", classes=f"hx-over hx-edge hx-{edge}")
+    reset_button(view)
+    with html.Div(classes="hx-slider"):
+        Slider(typed_state=connect_slice_view_slider_to_state(server, view), density="compact")
+    follow_slice(server, view_id, view)
+
+
+def follow_slice(server: Any, view_id: str, view: Any) -> None:
+    """Keep position and letters of a slice view true."""
+    from hexafix.mrml.screen import edge_letters, slice_position
+
+    def show(*_: Any) -> None:
+        node = view.get_view_node()
+        with server.state as state:
+            state[state_name(view_id, "position")] = slice_position(node)
+            for edge, letters in edge_letters(node).items():
+                state[state_name(view_id, edge)] = letters
+
+    view.modified.connect(show)
+    show()
+
+
+def over_space(server: Any, view_id: str, view: Any) -> None:
+    """What lies over the 3D view."""
+    from trame.widgets import html
+
+    html.Div(VIEW_NAMES[view.get_singleton_tag()], classes="hx-over hx-name")
+    reset_button(view)
+
+
+def reset_button(view: Any) -> None:
+    """The button that shows the whole picture again."""
+    from trame.widgets import html
+    from trame.widgets import vuetify3 as v3
+
+    with html.Div(classes="hx-reset"):
+        v3.VBtn(
+            icon="mdi-fit-to-screen-outline",
+            title="Show all",
+            size="small",
+            variant="text",
+            color="white",
+            click=view.reset_view,
+        )
