@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,16 +15,39 @@ if TYPE_CHECKING:
 TITLE = "HexaFix"
 
 
+def started_presenter(case: Path | None) -> Presenter:
+    """A presenter whose threads come back to the running event loop.
+
+    Parameters
+    ----------
+    case : Path or None
+        Case file to open; its CT is read at once, while the page is still being built.
+    """
+    from hexafix.presenter import Presenter, Step
+
+    presenter = Presenter(post=asyncio.get_running_loop().call_soon_threadsafe)
+    if case is not None and presenter.open_case(case):
+        presenter.run(Step.LOAD)
+    return presenter
+
+
+def quiet_vtk() -> None:
+    """Keep VTK's own words off the terminal: they can quote paths (H51)."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    if not os.environ.get("HEXAFIX_DEBUG"):
+        vtkObject.GlobalWarningDisplayOff()
+
+
 class Workstation:
     """What the browser shows and what it asks for.
 
-    Built inside the running event loop, which is its only thread; the presenter's own threads
-    come back by `post`.
+    Built inside the running event loop, which is its only thread.
 
     Parameters
     ----------
     presenter : Presenter or None
-        None: a new one, with an empty case.
+        Of `started_presenter`; None: a new one, with an empty case.
     server : trame_server.Server or None
         None: a new one of its own.
 
@@ -53,19 +76,18 @@ class Workstation:
 
         from hexafix.mrml.logic import SceneLogic
         from hexafix.mrml.sync import SceneSync
-        from hexafix.presenter import Presenter
         from hexafix.web.panel import Panel
 
-        self._loop = asyncio.get_running_loop()
         self.server = server or get_server(f"hexafix-{id(self)}", client_type="vue3")
         self.server.enable_module(trame_slicer_module)
         self.state, self.ctrl = self.server.state, self.server.controller
+        quiet_vtk()
         self.app = SlicerApp()
-        self.presenter = presenter or Presenter(post=self.post)
+        self.presenter = presenter or started_presenter(None)
         self.logic = SceneLogic(self.app.scene, app_logic=self.app.app_logic)
         self.sync = SceneSync(self.logic, self.presenter)
         self.state.trame__title = TITLE
-        self.views = Views(self.server, self.app, self.presenter, self.logic)
+        self.views = Views(self.server, self.app, self.presenter, self.sync)
         self.panel = Panel(self.server, self.presenter, self.views)
         self.views.ball_clicked = self.panel.ball_clicked
         self.views.act = self.panel.act
@@ -73,22 +95,12 @@ class Workstation:
         self.presenter.changed.connect(self._show)
         self._show(self.presenter.snapshot)
 
-    def post(self, call: Callable[[], Any]) -> None:
-        """Run `call` on the event loop; any thread may ask."""
-        self._loop.call_soon_threadsafe(call)
-
-    def open_case(self, path: Path) -> None:
-        """Open a case file; its image is read off the event loop, with progress in the page."""
-        from hexafix.presenter import Step
-
-        self.presenter.open_case(path)
-        self.presenter.run(Step.LOAD)
-
     def close(self) -> None:
         """Stop the presenter's work and let go of the scene."""
         self.presenter.changed.disconnect(self._show)
         self.panel.close()
         self.presenter.close()
+        self.sync.close()
         self.views.close()
 
     def _show(self, snapshot: Snapshot) -> None:

@@ -21,11 +21,18 @@ class Clicks:
         The view to watch.
     clicked : callable
         Gets the view and the pixel from its lower left corner.
+    released : callable
+        Called when the button goes up, after a click or a drag.
     """
 
-    def __init__(self, view: Any, clicked: Callable[[Any, int, int], None]) -> None:
+    def __init__(
+        self,
+        view: Any,
+        clicked: Callable[[Any, int, int], None],
+        released: Callable[[], None],
+    ) -> None:
         self._view = view
-        self._clicked = clicked
+        self._clicked, self._was_released = clicked, released
         self._down: tuple[int, int] | None = None
         interactor = view.interactor()
         interactor.AddObserver("LeftButtonPressEvent", self._press, BEFORE_MRML)
@@ -39,3 +46,4 @@ class Clicks:
         x, y = interactor.GetEventPosition()
         if down and abs(x - down[0]) <= STILL_PX and abs(y - down[1]) <= STILL_PX:
             self._clicked(self._view, x, y)
+        self._was_released()

@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from hexafix.errors import InputError
 from hexafix.web.server import Access, Guard, add_downloads
 
 CLOSING_S = 3.0
@@ -43,13 +44,14 @@ def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> 
 
 
 async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any]) -> None:
-    from hexafix.web.app import Workstation
+    from hexafix.web.app import Workstation, started_presenter
 
     stop = asyncio.Event()
     with suppress(NotImplementedError):
         for name in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(name, stop.set)
-    workstation = Workstation()
+    presenter = started_presenter(case)
+    workstation = Workstation(presenter=presenter)
     server = workstation.server
     server.controller.on_server_bind.add(
         lambda bound: guard_application(bound.app, access, workstation)
@@ -58,11 +60,9 @@ async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any])
     running = asyncio.ensure_future(start(server, access))
     stopped = asyncio.ensure_future(stop.wait())
     try:
-        if case is not None:
-            workstation.open_case(case)
         await asyncio.wait({running, stopped}, return_when=asyncio.FIRST_COMPLETED)
         if running.done():
-            running.result()
+            _why_it_ended(running, access)
     finally:
         await _end(workstation, running, stopped)
 
@@ -93,6 +93,20 @@ def guard_application(app: Any, access: Access, workstation: Any) -> None:
     Guard(access, policy(text)).install(app)
     add_page(app, text)
     add_downloads(app, workstation.presenter.prescription_files)
+
+
+def _why_it_ended(running: Any, access: Access) -> None:
+    """The address may not be ours to bind; anything else is a defect."""
+    try:
+        running.result()
+    except OSError as error:
+        raise InputError.of(
+            "address-not-free",
+            f"the server cannot listen there: {error.strerror or 'the address is not ours'}",
+            value=f"{access.host}:{access.port}",
+            where="--port",
+            next_step="leave --host and --port out: any free port is taken",
+        ) from error
 
 
 async def _end(workstation: Any, running: Any, stopped: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -41,8 +42,8 @@ class Views:
         MRML scene and view manager.
     presenter : hexafix.presenter.Presenter
         Whose values are shown; a marker added by a click goes to it.
-    logic : hexafix.mrml.logic.SceneLogic
-        The scene's own logic.
+    sync : hexafix.mrml.sync.SceneSync
+        Keeps scene and presenter together.
 
     Attributes
     ----------
@@ -52,15 +53,16 @@ class Views:
         Does a piece of work and shows its error, if it has one.
     """
 
-    def __init__(self, server: Any, app: Any, presenter: Presenter, logic: Any) -> None:
+    def __init__(self, server: Any, app: Any, presenter: Presenter, sync: Any) -> None:
         from trame_slicer.core import LayoutManager
         from trame_slicer.rca_view import register_rca_factories
 
-        self._state, self._app, self._presenter, self._logic = server.state, app, presenter, logic
+        self._state, self._app, self._presenter = server.state, app, presenter
+        self._sync, self._logic = sync, sync.logic
         self.ball_clicked: Callable[[int], None] = lambda _: None
         self.act: Callable[[Callable[[], Any]], Any] = lambda work: work()
         self._picked: Callable[[Sequence[float]], None] | None = None
-        self._placing = False
+        self._placing = self._dragging_fragment = False
         self._volume: Any = None
         self._framed = False
         self._state.update({"views_layout": FOUR, "views_hint": ""})
@@ -75,7 +77,9 @@ class Views:
         self._layouts = LayoutManager(app.scene, app.view_manager, server)
         self._layouts.register_layout_dict(grid())
         self._layouts.set_layout(FOUR)
-        self._clicks = [Clicks(view, self._clicked) for view in app.view_manager.get_views()]
+        self._clicks = [
+            Clicks(view, self._clicked, self._released) for view in app.view_manager.get_views()
+        ]
         for view in app.view_manager.get_threed_views():
             prepare_space(view)
 
@@ -149,12 +153,12 @@ class Views:
 
     def drag_fragment(self, on: bool) -> None:
         """Show or hide the handles that drag the moving bone fragment."""
+        self._dragging_fragment = on
         self._logic.drag_fragment(on)
 
     def show_playback_row(self, row: int | None) -> None:
         """Move frame and bone to a row of the schedule; None: back to what the CT shows."""
-        playback = self._presenter.playback() if row is not None else None
-        self._logic.show_playback_row(playback, row)
+        self._sync.show_playback_row(row)
 
     def show_landmarks(
         self, moving: Sequence[Sequence[float]], fixed: Sequence[Sequence[float]]
@@ -195,6 +199,12 @@ class Views:
             index = self._ball_under(view, x, y, in_slice)
             if index is not None:
                 self.ball_clicked(index)
+
+    def _released(self) -> None:
+        """What the handles were dragged to becomes the case's correction once they are let go."""
+        if self._dragging_fragment:
+            # Later: the handles have not seen this event yet.
+            asyncio.get_running_loop().call_soon(lambda: self.act(self._sync.commit_fragment))
 
     def _ball_under(self, view: Any, x: int, y: int, in_slice: bool) -> int | None:
         from hexafix.mrml.screen import nearest_in_slice, nearest_in_space

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,11 +77,11 @@ class Panel:
                 "poses": PosesStep(context).build,
                 "readings": self._readings.build,
                 "correction": self._correction.build,
-                "schedule": ScheduleStep(context).build,
+                "schedule": ScheduleStep(context, self._playback.build_curves).build,
                 "export": self._export.build,
             },
         )
-        self._pictures: dict[str, str] = {}
+        self._drawn: tuple[Any, Any] = (None, None)
         server.trigger("hx_escape")(self.escape)
 
     def toolbar(self) -> None:
@@ -101,14 +103,24 @@ class Panel:
         self._pages.build_dialog()
         self._bar.build_dialog()
 
+    def act(self, work: Callable[[], Any]) -> bool:
+        """Do a view's work; an error is shown as a notice. Whether it was done."""
+        return self._context.act(work)
+
     def ball_clicked(self, index: int) -> None:
         """Take a click on a ball in a view: it gets the picked number, else it is picked."""
         from hexafix.presenter import Step
 
-        if self._context.presenter.snapshot.current == Step.NUMBERING:
-            self._numbering.ball_clicked(index)
-        else:
-            self._markers.pick(index)
+        with self._context.server.state:
+            if self._context.presenter.snapshot.current == Step.NUMBERING:
+                self._numbering.ball_clicked(index)
+            else:
+                self._markers.pick(index)
+
+    def act(self, work: Callable[[], Any]) -> bool:
+        """Do what a view asks for; an error becomes a notice. Whether it was taken."""
+        with self._context.server.state:
+            return self._context.act(work)
 
     def escape(self) -> None:
         """Leave every mode: nothing is picked, added or dragged by the next click."""
@@ -133,7 +145,7 @@ class Panel:
                 snapshot, presenter.value(Step.NUMBERING), presenter.is_fresh(Step.NUMBERING)
             )
             self._correction.update(snapshot, self._center())
-            self._show_pictures()
+            self._show_plan(snapshot)
             files = presenter.prescription_files()
             self._pages.update(files)
             self._export.update(snapshot, files)
@@ -154,10 +166,17 @@ class Panel:
 
         return split_point(recognised, self._context.presenter.split_fraction)
 
-    def _show_pictures(self) -> None:
-        pictures = self._context.presenter.pictures()
-        if pictures != self._pictures:
-            self._pictures = pictures
+    def _show_plan(self, snapshot: Snapshot) -> None:
+        """Pictures and playback, drawn anew only for another plan or another layout."""
+        from hexafix.presenter import Step
+
+        presenter = self._context.presenter
+        plan, poses = presenter.value(Step.SCHEDULE), presenter.value(Step.POSES)
+        if (plan, poses) != self._drawn:
+            self._drawn = (plan, poses)
             self._context.data.pictures = {
-                name: data_address(svg, "image/svg+xml") for name, svg in pictures.items()
+                name: data_address(svg, "image/svg+xml")
+                for name, svg in presenter.pictures().items()
             }
+            self._playback.take(snapshot, presenter.playback(), plan)
+        self._playback.update(presenter.is_fresh(Step.SCHEDULE))
