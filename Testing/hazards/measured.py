@@ -177,7 +177,7 @@ def verdict(
     volume = Volume(np.zeros((2, 2, 2), np.int16), np.eye(4), source or ImageSource())
     home = sys.modules[recognise.__module__]
     try:
-        with mock.patch.object(home, "find_balls", return_value=seen):
+        with mock.patch.object(home, "case_balls", return_value=seen):
             plan_correction(read(document), volume=volume)
     except Refused as error:
         return [(fault.hazard, fault.code) for fault in error.faults]

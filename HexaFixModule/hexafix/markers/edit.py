@@ -160,13 +160,30 @@ def _added(
 
 def _settled(crop: Crop, point: NDArray[np.float64], radius: float) -> RayFit | None:
     """The fine fit nearest a point that need not be near the ball's centre."""
-    start, rough = point, None
+    for start in (point, _brightest_about(crop, point, radius)):
+        rough = None
+        for _ in range(FITS):
+            rough = rough_fit(crop, start, radius)
+            if rough is None or np.linalg.norm(rough.center_mm - point) > 2.0 * radius:
+                break
+            start = rough.center_mm
+        else:
+            if rough is not None:
+                return fine_fit(crop, rough, radius)
+    return None
+
+
+def _brightest_about(crop: Crop, point: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """The middle of what is bright within a radius, followed from a point: rays need an inside."""
+    bright = crop.voxels > 0.5 * (float(np.median(crop.voxels)) + crop.brightest)
+    places = crop.points_mm[bright]
+    middle = point
     for _ in range(FITS):
-        rough = rough_fit(crop, start, radius)
-        if rough is None or np.linalg.norm(rough.center_mm - point) > 2.0 * CAPTURE_SHARE * radius:
-            return None
-        start = rough.center_mm
-    return None if rough is None else fine_fit(crop, rough, radius)
+        near = places[np.linalg.norm(places - middle, axis=-1) <= radius]
+        if not len(near):
+            break
+        middle = near.mean(axis=0)
+    return middle
 
 
 def _with_material(fitted: FittedBall, others: list[Ball]) -> Ball:
