@@ -43,6 +43,7 @@ from hexafix.pipeline.scenery import (
     prescription_pages,
     scene_of,
     split_point,
+    strut_curves_at,
 )
 from hexafix.pipeline.weigh import weigh_document
 
@@ -87,6 +88,7 @@ __all__ = [
     "scene_at",
     "scene_of",
     "split_point",
+    "strut_curves_at",
     "weigh_document",
     "write_prescription",
 ]

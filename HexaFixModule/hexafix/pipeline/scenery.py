@@ -103,6 +103,11 @@ def pictures(document: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
+def strut_curves_at(document: Mapping[str, Any], row: int) -> str:
+    """The struts' curves of a plan document as SVG, a row of the schedule marked."""
+    return figures.strut_curves(document, row=row)
+
+
 def layout_pictures(proximal: MarkerLayout, distal: MarkerLayout) -> dict[str, str]:
     """The layout roses as SVG, before there is a plan: ``layout_proximal``, ``layout_distal``."""
     return _roses({"proximal": _sites(proximal), "distal": _sites(distal)})

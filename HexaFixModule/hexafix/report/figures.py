@@ -72,8 +72,11 @@ def _gauge(canvas: Canvas, x: float, box: tuple[float, float], limits: Any, used
         canvas.text((x + 3, at + 0.9), words, size_mm=2.3, fill=INK)
 
 
-def strut_curves(document: Mapping[str, Any]) -> str:
-    """Scale value against day for each strut, beside its whole stroke (SVG)."""
+def strut_curves(document: Mapping[str, Any], *, row: int | None = None) -> str:
+    """Scale value against day for each strut, beside its whole stroke (SVG).
+
+    With `row`, that row of the schedule is marked on each curve.
+    """
     schedule = document["schedule"]
     strut = document["case"]["fixator"]["strut"]
     offset = strut.get("scale_offset_mm", 0.0)
@@ -94,6 +97,9 @@ def strut_curves(document: Mapping[str, Any]) -> str:
         steps = np.stack([np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]], axis=-1)
         canvas.path([steps], closed=False, stroke=INK, stroke_width=1.15)
         canvas.path([steps], closed=False, stroke=colour.fill, stroke_width=0.8)
+        if row is not None:
+            canvas.line((x[row], top), (x[row], top + high), stroke=INK, stroke_width=0.3)
+            canvas.circle((x[row], y[row]), 1.3, fill=PAPER, stroke=INK, stroke_width=0.5)
         badge(canvas, (left + 3, top - 2.2), index + 1, 2.2)
         words = f"{format_number(table[0, index], 1)} to {format_number(table[-1, index], 1)} mm"
         canvas.text((left + 7, top - 1.3), words, size_mm=2.8, fill=INK, font_weight="bold")
