@@ -33,10 +33,15 @@ class Banners:
             classes=("['hx-banner', 'hx-banner-' + banner.kind]",),
             **marked("banner", data_kind=("banner.kind",), data_code=("banner.code",)),
         ):
-            v.VIcon(icon=("banner.icon",), size="small", color=("banner.color",))
+            v.VIcon(
+                icon=("banner.icon",),
+                size="small",
+                color=("banner.color",),
+                **marked("banner-icon", label=("banner.word",)),
+            )
             with html.Div(classes="hx-banner-text"):
                 with html.Div(classes="hx-banner-title"):
-                    html.Span("{{ banner.word }}: {{ banner.title }}")
+                    html.Span("{{ banner.title }}")
                     html.Span("{{ banner.hazard }}", v_if="banner.hazard", classes="hx-hazard")
                 html.Div("{{ banner.message }}", **marked("banner-message"))
                 with html.Div(
@@ -59,7 +64,7 @@ class Banners:
             **marked("banner-line", data_kind=("banner.kind",), data_code=("banner.code",)),
         ):
             v.VIcon(icon=("banner.icon",), size="x-small", color=("banner.color",))
-            html.Span("{{ banner.word }}: {{ banner.title }}")
+            html.Span("{{ banner.title }}")
 
     def _notice(self) -> None:
         """What could not be done just now, apart from the steps."""

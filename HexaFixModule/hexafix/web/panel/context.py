@@ -43,15 +43,16 @@ class PanelContext:
 
         The presenter's own actions tell their errors as banners and return False.
         """
-        try:
-            if work() is False:
-                self._mark_refused(field)
+        with self.server.state:
+            try:
+                if work() is False:
+                    self._mark_refused(field)
+                    return False
+            except HexaFixError as error:
+                self.tell(error, field=field)
                 return False
-        except HexaFixError as error:
-            self.tell(error, field=field)
-            return False
-        self.forgive(field)
-        return True
+            self.forgive(field)
+            return True
 
     def _mark_refused(self, field: str | None) -> None:
         self.data.notice = {}

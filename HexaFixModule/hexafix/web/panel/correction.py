@@ -253,6 +253,6 @@ class CorrectionStep:
 
 def point_words(point: Sequence[float]) -> list[str]:
     """A point for fields; a tenth of a millimetre is finer than a click."""
-    from hexafix.pipeline import format_number
+    from hexafix.pipeline.text import format_number
 
     return [format_number(value, 1) for value in point]

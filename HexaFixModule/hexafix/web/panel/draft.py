@@ -73,7 +73,8 @@ def of_document(correction: Mapping[str, Any], draft: Mapping[str, Any]) -> dict
 
 def motion_words(matrix: Any, center: Sequence[str]) -> dict[str, Any]:
     """A fragment's motion in numbers about the draft's centre; nothing without a centre."""
-    from hexafix.pipeline import format_number, motion_numbers
+    from hexafix.pipeline import motion_numbers
+    from hexafix.pipeline.text import format_number
 
     if not all(center):
         return {}

@@ -62,7 +62,6 @@ class ExportStep:
             primary=True,
             disabled=(name.busy,),
         )
-        self._pages.build()
         self._side()
         title("Export")
         html.Div(
@@ -94,6 +93,7 @@ class ExportStep:
             **marked("exported-to", role="status"),
         )
         note("Every file is marked: not approved. The printed prescription is signed by hand.")
+        self._pages.build()
 
     def _side(self) -> None:
         from trame.widgets import html

@@ -164,6 +164,6 @@ class Landmarks:
 
 
 def _words(point: Sequence[float] | None) -> str:
-    from hexafix.pipeline import format_number
+    from hexafix.pipeline.text import format_number
 
     return "" if point is None else " ".join(format_number(value, 1) for value in point)

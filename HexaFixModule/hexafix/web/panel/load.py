@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hexafix.web.files import IMAGE_SUFFIXES
+from hexafix.web.files import IMAGE_SUFFIXES, start_folder
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext
 from hexafix.web.panel.widgets import button, choice, marked, note, table, title
@@ -127,15 +127,20 @@ class LoadStep:
 
     def _list(self) -> None:
         self._data.picked = -1
+        self._context.act(lambda: self._context.presenter.list_series(self._path()))
+
+    def _path(self) -> Path:
+        """The path as written; a relative one is relative to the case file."""
         path = Path(self._data.path.strip()).expanduser()
-        self._context.act(lambda: self._context.presenter.list_series(path))
+        return start_folder(self._context.presenter.snapshot.case_path) / path
 
     def _pick(self, row: int) -> None:
         self._data.picked = row
 
     def _load(self) -> None:
-        path = Path(self._data.path.strip()).expanduser()
         row = self._data.picked
         uids = self._data.uids
         uid = uids[row] if 0 <= row < len(uids) else None
-        self._context.act(lambda: self._context.presenter.load_image(path, series_instance_uid=uid))
+        self._context.act(
+            lambda: self._context.presenter.load_image(self._path(), series_instance_uid=uid)
+        )

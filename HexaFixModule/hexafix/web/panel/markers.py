@@ -81,6 +81,7 @@ class MarkersStep:
             click=(self.pick, "[i]"),
             picked=f"{name.picked} === i",
             row_end=self._row_end,
+            hidden=("Sigma mm", "HU"),
             empty="No ball was searched yet.",
         )
         note("Click a ball to see it in the views; in the views it can be dragged.")

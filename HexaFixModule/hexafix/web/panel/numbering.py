@@ -204,7 +204,7 @@ class NumberingStep:
 
 def ring_words(found: Mapping[str, Any] | None) -> str:
     """How well a ring's numbers fit, and how far the next best numbering is."""
-    from hexafix.pipeline import format_mm
+    from hexafix.pipeline.text import format_mm
 
     if not found:
         return ""

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.prescription import data_address
 from hexafix.web.panel.struts import badge
-from hexafix.web.panel.widgets import icon_button, marked
+from hexafix.web.panel.widgets import icon_button, marked, picture
 from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
@@ -27,7 +28,9 @@ class PlaybackState:
     row, last : int
         The shown row and the last one; row 0 is today.
     struts : list of dict
-        value, turn, way (``longer``, ``shorter`` or nothing), arrow.
+        value, turn, way (``longer``, ``shorter`` or ``no turn``), arrow.
+    curves : str
+        Curves of all struts with the shown row marked, as a data address.
     """
 
     shown: bool = False
@@ -37,6 +40,7 @@ class PlaybackState:
     playing: bool = False
     when: str = ""
     struts: list = field(default_factory=list)
+    curves: str = ""
 
 
 class Playback:
@@ -51,6 +55,7 @@ class Playback:
         self._typed = typed
         self._playback: Any = None
         self._rows: tuple[tuple[str, ...], ...] = ()
+        self._document: Any = None
         self._task: asyncio.Task | None = None
 
     def build(self) -> None:
@@ -111,36 +116,46 @@ class Playback:
                     **marked(("'play-turn-' + (i + 1)",)),
                 )
 
-    def update(self, snapshot: Snapshot, playback: Any, fresh: bool) -> None:
-        """Take a new plan; the shown row stays where the plan is the same.
+    def build_curves(self) -> None:
+        """Make the curves of all struts with the shown row marked."""
+        picture(self._name.curves, "Scale value of each strut over the days", "strut-curves")
+
+    def take(self, snapshot: Snapshot, playback: Any, plan: Any) -> None:
+        """Take another plan, shown from today on.
 
         Parameters
         ----------
         snapshot : Snapshot
         playback : Playback or None
             The pipeline's rows with their poses.
-        fresh : bool
-            Whether the plan is of the present inputs.
+        plan : Plan or None
         """
         table = snapshot.tables.get("strut_plan")
-        self._data.fresh = fresh
-        if playback is self._playback:
-            return
         self._stop()
         self._playback = playback
         self._rows = table.rows if table and playback else ()
+        self._document = None
+        if plan is not None:
+            from hexafix.pipeline import plan_document_of
+
+            self._document = plan_document_of(plan)
         self._data.shown = bool(self._rows)
         self._data.last = max(len(self._rows) - 1, 0)
         if self._rows:
             self._show(0, views=False)
         self._context.controls.show_playback_row(None)
 
+    def update(self, fresh: bool) -> None:
+        """Grey the playback of a plan that is not of the present inputs."""
+        self._data.fresh = fresh
+
     def close(self) -> None:
         """Stop playing."""
         self._stop()
 
     def _show(self, row: int, *, views: bool = True) -> None:
-        from hexafix.pipeline import format_change
+        from hexafix.pipeline import strut_curves_at
+        from hexafix.pipeline.text import format_change
 
         words = self._rows[row][3:]
         before = self._rows[max(row - 1, 0)][3:]
@@ -151,6 +166,7 @@ class Playback:
             {"value": value, **turn_words(float(by), change)}
             for value, by, change in zip(words, turned, format_change(before, words), strict=True)
         ]
+        self._data.curves = data_address(strut_curves_at(self._document, row), "image/svg+xml")
         if views:
             self._context.controls.show_playback_row(row)
 
@@ -211,4 +227,4 @@ def turn_words(turned: float, change: str) -> dict[str, str]:
         return {"turn": change, "way": "longer", "arrow": "▲"}
     if turned < 0:
         return {"turn": change, "way": "shorter", "arrow": "▼"}
-    return {"turn": "", "way": "", "arrow": "·"}
+    return {"turn": "", "way": "no turn", "arrow": ""}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from hexafix.web.panel.context import PanelContext, number, whole_number
-from hexafix.web.panel.widgets import button, choice, field, marked, note, picture, table
+from hexafix.web.panel.widgets import button, choice, field, marked, note, table
 from hexafix.web.state import NUMBERS_OF_SCHEDULE
 
 LABELS = {
@@ -23,10 +23,17 @@ COMPENSATION = (
 
 
 class ScheduleStep:
-    """How fast and in which steps the patient turns; the plan."""
+    """How fast and in which steps the patient turns; the plan.
 
-    def __init__(self, context: PanelContext) -> None:
-        self._context = context
+    Parameters
+    ----------
+    context : PanelContext
+    curves : callable
+        Makes the picture of the struts' curves.
+    """
+
+    def __init__(self, context: PanelContext, curves: Callable[[], None]) -> None:
+        self._context, self._curves = context, curves
 
     def build(self) -> None:
         """Make the step's fields, tables and curves."""
@@ -73,22 +80,18 @@ class ScheduleStep:
             primary=True,
             disabled=(context.name.busy,),
         )
-        table(context, "strut_plan", "Struts over the whole plan", empty="Nothing is planned yet.")
-        picture(
-            f"{context.name.pictures}.strut_curves",
-            "Scale value of each strut over the days",
-            "strut-curves",
-        )
+        table(context, "schedule", "The plan", empty="Nothing is planned yet.")
+        self._curves()
         with html.Details(
-            v_if=f"{context.name.table_schedule}.rows.length",
+            v_if=f"{context.name.table_strut_plan}.rows.length",
             classes="hx-details",
             **marked("schedule-details"),
         ):
             html.Summary(
-                f"Schedule, all {{{{ {context.name.table_schedule}.rows.length }}}} rows",
+                f"Schedule, all {{{{ {context.name.table_strut_plan}.rows.length }}}} rows",
                 **marked("schedule-summary"),
             )
-            table(context, "schedule", "Scale values to set, mm")
+            table(context, "strut_plan", "Scale values to set, mm")
 
     def _set(self, key: str, text: str) -> None:
         where, name = f"schedule.{key}", f"schedule-{key}"

@@ -55,7 +55,9 @@ class Stepper:
                 html.Span(f"{{{{ {view}.title }}}}", classes="hx-head-title")
                 html.Span(
                     f"{{{{ {view}.summary }}}}",
+                    v_if=f"{view}.summary !== {view}.word",
                     classes="hx-summary",
+                    title=(f"{view}.summary",),
                     **marked(f"summary-{step}"),
                 )
             with html.Span(

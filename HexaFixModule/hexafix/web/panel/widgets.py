@@ -40,7 +40,7 @@ def button(
 
     look = {"color": "primary", "variant": "flat"} if primary else {"variant": "outlined"}
     return v.VBtn(
-        words,
+        f"{{{{ {words[0]} }}}}" if isinstance(words, tuple) else words,
         click=click,
         size="small",
         prepend_icon=icon,
@@ -154,6 +154,7 @@ def table(
     picked: str = "false",
     row_end: Callable[[], Any] | None = None,
     empty: str = "",
+    hidden: tuple[str, ...] = (),
 ) -> None:
     """One of the snapshot's tables as it is: words in cells, grey when out of date.
 
@@ -172,9 +173,12 @@ def table(
         Builds what stands in a last cell of each row.
     empty : str
         Shown while there are no rows.
+    hidden : tuple of str
+        Heads of columns for which there is no room here.
     """
     from trame.widgets import html
 
+    left = f"!{[*hidden]}.includes"
     words = getattr(context.name, f"table_{name}")
     if empty:
         html.Div(empty, v_if=f"!{words}.rows.length", classes="hx-note", **marked(f"no-{name}"))
@@ -189,14 +193,15 @@ def table(
             html.Span(caption)
             html.Span(" · out of date", v_if=f"{words}.stale", classes="hx-late")
         with html.Thead(), html.Tr():
-            html.Th("{{ column }}", v_for=f"column in {words}.columns", scope="col", key="column")
+            with html.Template(v_for=f"column in {words}.columns", key="column"):
+                html.Th("{{ column }}", v_if=f"{left}(column)", scope="col")
             if row_end:
                 html.Th(raw_attrs=['aria-label="actions"'])
         with html.Tbody():
-            _rows(name, words, click, picked, row_end)
+            _rows(name, words, click, picked, row_end, left)
 
 
-def _rows(name: str, words: str, click: Any, picked: str, row_end: Any) -> None:
+def _rows(name: str, words: str, click: Any, picked: str, row_end: Any, left: str) -> None:
     from trame.widgets import html
 
     raw = marked((f"'{name}-' + i",))["raw_attrs"]
@@ -213,7 +218,12 @@ def _rows(name: str, words: str, click: Any, picked: str, row_end: Any) -> None:
             raw_attrs=raw,
             **acts,
         ):
-            html.Td("{{ cell }}", v_for="(cell, j) in row", key="j")
+            with html.Template(v_for="(cell, j) in row", key="j"):
+                html.Td(
+                    "{{ cell }}",
+                    v_if=f"{left}({words}.columns[j])",
+                    classes=("/[a-z]/.test(cell) ? '' : 'hx-figure'",),
+                )
             if row_end:
                 with html.Td(classes="hx-end"):
                     row_end()
