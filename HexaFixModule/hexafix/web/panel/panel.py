@@ -102,10 +102,6 @@ class Panel:
         self._pages.build_dialog()
         self._bar.build_dialog()
 
-    def act(self, work: Callable[[], Any]) -> bool:
-        """Do a view's work; an error is shown as a notice. Whether it was done."""
-        return self._context.act(work)
-
     def ball_clicked(self, index: int) -> None:
         """Take a click on a ball in a view: it gets the picked number, else it is picked."""
         from hexafix.presenter import Step
@@ -148,7 +144,6 @@ class Panel:
             files = presenter.prescription_files()
             self._pages.update(files)
             self._export.update(snapshot, files)
-            self._playback.update(snapshot, presenter.playback(), presenter.is_fresh(Step.SCHEDULE))
 
     def close(self) -> None:
         """Stop what runs by itself."""
@@ -171,7 +166,7 @@ class Panel:
 
         presenter = self._context.presenter
         plan, poses = presenter.value(Step.SCHEDULE), presenter.value(Step.POSES)
-        if (plan, poses) != self._drawn:
+        if plan is not self._drawn[0] or poses is not self._drawn[1]:
             self._drawn = (plan, poses)
             self._context.data.pictures = {
                 name: data_address(svg, "image/svg+xml")
