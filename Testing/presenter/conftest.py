@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from hexafix.errors import Refused
+from hexafix.progress import silent
 
 GATE = {
     "gate": "G2", "code": "ring-rms", "name": "rigid RMS", "hazard": "H01", "value": 0.02,
@@ -43,10 +44,10 @@ class FakeEngine:
                 progress(name, 0.5)
         progress(name, 1.0)
 
-    def image_series(self, path, *, progress=None):
+    def image_series(self, path, *, progress=silent):
         return {"series": [], "patients": 1, "skipped": []}
 
-    def read_image(self, path, *, series_instance_uid=None, progress=None):
+    def read_image(self, path, *, series_instance_uid=None, progress=silent):
         self._long("read_image", progress)
         content = path.read_bytes()
         made = self._made("read_image", content.decode(), series_instance_uid)
@@ -59,13 +60,27 @@ class FakeEngine:
         }  # fmt: skip
 
     def find_case_balls(
-        self, volume, *, ball_diameter_mm, added_lps_mm=(), removed_lps_mm=(), progress=None
+        self,
+        volume,
+        *,
+        ball_diameter_mm,
+        added_lps_mm=(),
+        removed_lps_mm=(),
+        found=None,
+        progress=silent,
     ):
-        self._long("find_case_balls", progress)
-        made = self._made(
-            "find_case_balls", volume.made, ball_diameter_mm, added_lps_mm, removed_lps_mm
-        )
+        if found is None:
+            self._long("find_case_balls", progress)
+            self.calls.append("search")
+        self._made("edit_balls")
+        made = digest("balls", volume.made, ball_diameter_mm, added_lps_mm, removed_lps_mm)
         return SimpleNamespace(made=made)
+
+    def with_ball_added(self, edits, *, lps_mm):
+        return {**edits, "added_lps_mm": [*edits["added_lps_mm"], lps_mm]}
+
+    def with_ball_removed(self, edits, *, ball):
+        return {**edits, "removed_lps_mm": [*edits["removed_lps_mm"], ball["center_mm"]]}
 
     def balls_document(self, balls):
         ball = {
@@ -85,14 +100,14 @@ class FakeEngine:
             found = {str(n): round(float(p[0])) for n, p in assigned.items()}
         lengths = parts.strut_readings_mm
         made = self._made("judge", balls.made, found, None if lengths is None else list(lengths))
-        ring = {"residuals_mm": {}, "rms_mm": 0.01}
+        ring = {"residuals_mm": dict.fromkeys(found, 0.01), "rms_mm": 0.01}
         return {
             "made": made, "complete": len(found) == 8, "assigned": found,
-            "rings": {"proximal": ring, "distal": ring}, "faults": [],
+            "rings": {"proximal": ring, "distal": {"residuals_mm": {}}}, "faults": [],
         }  # fmt: skip
 
     def recognise_checked(
-        self, case, *, volume=None, balls=None, accept_relaxed_layout=False, progress=None
+        self, case, *, volume=None, balls=None, accept_relaxed_layout=False, progress=silent
     ):
         self._long("recognise", progress)
         case_made = digest(dict(case.document), accept_relaxed_layout)
@@ -114,7 +129,8 @@ class FakeEngine:
         return {"proximal": ring, "distal": ring, "advice": []}
 
     def weigh_document(self, case, recognised):
-        return {"made": self._made("weigh", recognised.made, dict(case.document)), "faults": []}
+        made = self._made("weigh", recognised.made, dict(case.document))
+        return {"made": made, "struts": [], "faults": []}
 
     def preview_target(self, case, recognised):
         return {"made": self._made("preview", recognised.made, dict(case.document)), "faults": []}
@@ -127,6 +143,7 @@ class FakeEngine:
         row = {"day": 0, "date": "2026-12-01", "adjustment": 0, "strut_mm": [180.0] * 6}
         return {
             "made": plan.made,
+            "gates": [GATE],
             "schedule": {
                 "start_date": "2026-12-01", "days": 1, "adjustments_per_day": 4,
                 "ruling_point": "centre", "rate_mm_per_day": 1.0, "rate_deg_per_day": 1.0,
@@ -134,11 +151,11 @@ class FakeEngine:
             },
         }  # fmt: skip
 
-    def prescribe(self, plan, *, progress=None):
+    def prescribe(self, plan, *, progress=silent):
         self._long("prescribe", progress)
         made = self._made("prescribe", plan.made)
         files = {"plan.json": made.encode()}
-        return SimpleNamespace(made=made, document={"made": made}, files=files)
+        return SimpleNamespace(made=made, document={"made": made, "gates": [GATE]}, files=files)
 
     def write_prescription(self, prescription, folder):
         folder.mkdir()
@@ -151,7 +168,7 @@ class FakeEngine:
     def pictures(self, document):
         return {"strut_curves": "<svg/>"}
 
-    def layout_pictures(self, document):
+    def layout_pictures(self, proximal, distal):
         return {"layout_proximal": "<svg/>"}
 
 

@@ -8,6 +8,7 @@ by one: read_image → find_case_balls → judge_numbering → recognise → wei
 preview_target → plan_recognised → prescribe → write_prescription.
 """
 
+from hexafix.pipeline.ball_edits import with_ball_added, with_ball_removed
 from hexafix.pipeline.document import recognition as recognition_document
 from hexafix.pipeline.judge import judge_case_numbering, judge_numbering
 from hexafix.pipeline.layout import check_case_layout
@@ -45,6 +46,16 @@ from hexafix.pipeline.scenery import (
     split_point,
     strut_curves_at,
 )
+from hexafix.pipeline.text import (
+    format_change,
+    format_deg,
+    format_measure,
+    format_mm,
+    format_number,
+    format_reading,
+    format_row,
+    format_setting,
+)
 from hexafix.pipeline.weigh import weigh_document
 
 layout_document = check_case_layout
@@ -62,6 +73,14 @@ __all__ = [
     "check_case_layout",
     "find_case_balls",
     "find_markers",
+    "format_change",
+    "format_deg",
+    "format_measure",
+    "format_mm",
+    "format_number",
+    "format_reading",
+    "format_row",
+    "format_setting",
     "image_document",
     "image_series",
     "judge_by_struts",
@@ -90,5 +109,7 @@ __all__ = [
     "split_point",
     "strut_curves_at",
     "weigh_document",
+    "with_ball_added",
+    "with_ball_removed",
     "write_prescription",
 ]

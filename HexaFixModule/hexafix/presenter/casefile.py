@@ -85,10 +85,3 @@ def write_case_file(path: Path, raw: bytes, *, expected: bytes | None) -> None:
             next_step="save under another name, then compare both",
         )
     replace_file(path, raw)
-
-
-def no_name() -> InputError:
-    """The error of a case that was never saved."""
-    return InputError.of(
-        "no-name", "the case has no file yet", next_step="choose where the case is saved"
-    )

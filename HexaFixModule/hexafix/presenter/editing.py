@@ -1,24 +1,29 @@
-"""The user's edits: each one version of the case document, with a label."""
+"""The user's edits: each makes one version of the case document, with a label."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from hexafix.errors import InputError
-from hexafix.presenter import notices
+from hexafix.presenter.casefile import path_in
 from hexafix.presenter.core import Core, action
-from hexafix.presenter.history import document_bytes
+from hexafix.presenter.history import Version, document_bytes
 from hexafix.presenter.state import Step
 
 Document = dict[str, Any]
+Change = Callable[[Document], Document | None]
+
+SIX = 6
 
 
 class Edits(Core):
-    """Edits, undo and redo, and what is asked a second time."""
+    """Edits of the case but for its balls, undo and redo, and what is asked a second time."""
 
-    def _edit(self, label: str, change: Callable[[Document], Document | None]) -> None:
+    def changed_document(self, label: str, change: Change) -> None:
+        """One edit: `change` alters its copy of the document, or returns another one."""
         document = self.version.copy()
         made = change(document)
         document = document if made is None else made
@@ -29,35 +34,33 @@ class Edits(Core):
         except (TypeError, ValueError) as error:
             raise InputError.of(
                 "not-json",
-                "the value cannot stand in a case file",
+                "this value cannot stand in a case",
                 hazard="H55",
                 next_step="give finite numbers and plain texts",
             ) from error
-        self._keep(replace(self.version, raw=raw, label=label))
+        self.keep(replace(self.version, raw=raw, label=label))
 
-    def _keep(self, version: Any) -> None:
+    def keep(self, version: Version) -> None:
+        """Make a version the present one."""
         self.history.edit(version)
-        self._after_change()
-
-    def _after_change(self) -> None:
-        """Stop work whose inputs are not the case's any more."""
+        self.new_version()
 
     @action
-    def edit(self, label: str, function: Callable[[Document], Document | None]) -> None:
-        """Any edit: `function` gets a copy of the document and returns what it shall be."""
-        self._edit(label, function)
+    def edit(self, label: str, function: Change) -> None:
+        """Any edit: `function` alters its copy of the document, or returns another one."""
+        self.changed_document(label, function)
 
     @action
     def undo(self) -> None:
         """Take the last edit back."""
         if self.history.undo():
-            self._after_change()
+            self.new_version()
 
     @action
     def redo(self) -> None:
         """Bring back the edit that was undone last."""
         if self.history.redo():
-            self._after_change()
+            self.new_version()
 
     @action
     def go_to(self, step: Step | str) -> None:
@@ -69,229 +72,111 @@ class Edits(Core):
     @action
     def set_case_id(self, case_id: str) -> None:
         """Name the case."""
-        self._edit("name the case", lambda document: {**document, "case_id": case_id})
+        self._set("case_id", case_id, "name the case")
 
     @action
     def set_limb(self, *, side: str | None = None, bone: str | None = None) -> None:
         """Set the limb's side or bone; None leaves it as it is."""
         given = {key: value for key, value in (("side", side), ("bone", bone)) if value is not None}
-
-        def change(document: Document) -> None:
-            document["limb"] = {**(document.get("limb") or {}), **given}
-
-        self._edit("set the limb", change)
+        self._set("limb", {**_part(self.version.copy(), "limb"), **given}, "set the limb")
 
     @action
     def set_fixator(self, id_or_document: str | Mapping[str, Any]) -> None:
-        """Choose the fixator: a shipped id, a path, or its definition."""
-        given = id_or_document if isinstance(id_or_document, str) else dict(id_or_document)
-        self._edit("choose the fixator", lambda document: {**document, "fixator": given})
+        """Choose the fixator: a shipped id, the path of a definition, or the definition."""
+        given: Any = id_or_document
+        if not isinstance(given, str):
+            given = dict(given)
+        elif Path(given).is_file():
+            given = path_in(self.version.folder, Path(given).resolve())
+        self._set("fixator", given, "choose the fixator")
 
     @action
     def set_ball_diameter(self, mm: float) -> None:
         """Set the diameter of the marker balls, mm."""
-
-        def change(document: Document) -> None:
-            document["markers"] = {**(document.get("markers") or {}), "ball_diameter_mm": mm}
-
-        self._edit("set the ball diameter", change)
+        self._set_marker_part("ball_diameter_mm", mm, "set the ball diameter")
 
     @action
     def set_markers(self, ring: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Set a ring's layout: number, radius_mm, sweep_deg, height_mm of each marker."""
         if ring not in ("proximal", "distal"):
             raise InputError.of("unknown-ring", "a ring is proximal or distal", where="markers")
+        self._set_marker_part(ring, [dict(row) for row in rows], f"set the {ring} layout")
 
-        def change(document: Document) -> None:
-            markers = {**(document.get("markers") or {}), ring: [dict(row) for row in rows]}
-            document["markers"] = markers
+    def _set_marker_part(self, key: str, value: Any, label: str) -> None:
+        self._set("markers", {**_part(self.version.copy(), "markers"), key: value}, label)
 
-        self._edit(f"set the {ring} layout", change)
-
-    # ------------------------------------------------------------ balls and numbers
-
-    @action
-    def add_marker(self, lps: Sequence[float]) -> None:
-        """Add a ball near a point of the image, LPS mm."""
-
-        def change(document: Document) -> None:
-            edits = _marker_edits(document)
-            edits["added_lps_mm"].append([float(value) for value in lps])
-
-        self._edit("add a ball", change)
-
-    @action
-    def remove_marker(self, ball_index: int) -> None:
-        """Take a ball away."""
-        center = self._center(ball_index)
-
-        def change(document: Document) -> None:
-            _marker_edits(document)["removed_lps_mm"].append(center)
-
-        self._edit(f"remove ball {ball_index + 1}", change)
-
-    @action
-    def move_marker(self, ball_index: int, lps: Sequence[float]) -> None:
-        """Move a ball to a point of the image, LPS mm; it settles on the ball there."""
-        center = self._center(ball_index)
-
-        def change(document: Document) -> None:
-            edits = _marker_edits(document)
-            edits["removed_lps_mm"].append(center)
-            edits["added_lps_mm"].append([float(value) for value in lps])
-
-        self._edit(f"move ball {ball_index + 1}", change)
-
-    @action
-    def number_automatically(self) -> None:
-        """Let the numbers be found."""
-        self._edit("number automatically", lambda document: {**document, "numbering": None})
-
-    @action
-    def assign_number(self, number: int, ball_index: int) -> None:
-        """Give a ball a number; one that it had, and the ball that had this one, lose theirs."""
-        center = self._center(ball_index)
-        before = self._numbers()
-
-        def change(document: Document) -> None:
-            kept = {key: at for key, at in before.items() if at != center}
-            document["numbering"] = _in_order({**kept, str(number): center})
-
-        self._edit(f"assign number {number}", change)
-
-    @action
-    def clear_number(self, number: int) -> None:
-        """Take a number from its ball."""
-        before = self._numbers()
-
-        def change(document: Document) -> None:
-            document["numbering"] = {k: at for k, at in before.items() if k != str(number)}
-
-        self._edit(f"clear number {number}", change)
-
-    @action
-    def swap_numbers(self, a: int, b: int) -> None:
-        """Exchange two numbers."""
-        before = self._numbers()
-        if str(a) not in before or str(b) not in before:
-            raise InputError.of(
-                "number-missing",
-                "both numbers must stand on a ball to be exchanged",
-                value=f"{a} and {b}",
-                hazard="H19",
-                next_step="assign both numbers first",
-            )
-
-        def change(document: Document) -> None:
-            swapped = {**before, str(a): before[str(b)], str(b): before[str(a)]}
-            document["numbering"] = _in_order(swapped)
-
-        self._edit(f"swap numbers {a} and {b}", change)
-
-    def _center(self, ball_index: int) -> list[float]:
-        found = self.result(Step.MARKERS)
-        balls = found.document["balls"] if found is not None and found.value is not None else None
-        if balls is None:
-            raise InputError.of(
-                "balls-out-of-date",
-                "the balls shown are not those of the present image and edits",
-                hazard="H40",
-                next_step="find the balls again",
-            )
-        if not 0 <= ball_index < len(balls):
-            raise InputError.of("no-such-ball", "there is no such ball", value=str(ball_index + 1))
-        return list(balls[ball_index]["center_mm"])
-
-    def _numbers(self) -> dict[str, list[float]]:
-        """The user's numbers, or those found, as a start of the user's."""
-        given = self.version.content.get("numbering")
-        if given is not None:
-            return dict(given)
-        judged = self.result(Step.NUMBERING)
-        if judged is None or judged.value is None:
-            return {}
-        return {number: self._center(ball) for number, ball in judged.document["assigned"].items()}
+    def _set(self, key: str, value: Any, label: str) -> None:
+        self.changed_document(label, lambda document: {**document, key: value})
 
     # ------------------------------------------------------------ readings, correction, schedule
 
     @action
-    def set_reading(self, strut: int, mm: float) -> None:
-        """Set the reading of one strut, 1 to 6, mm."""
-        if strut not in range(1, 7):
+    def set_reading(self, strut: int, mm: float | None) -> None:
+        """Set the reading of one strut, 1 to 6, mm; None: not read yet."""
+        if strut not in range(1, SIX + 1):
             raise InputError.of("no-such-strut", "struts are 1 to 6", value=str(strut))
-
-        def change(document: Document) -> None:
-            readings = list(document.get("strut_readings_mm") or [None] * 6)
-            readings[strut - 1] = mm
-            document["strut_readings_mm"] = readings
-
-        self._edit(f"set the reading of strut {strut}", change)
+        readings = list(self.version.copy().get("strut_readings_mm") or [None] * SIX)
+        readings[strut - 1] = mm
+        value = None if all(reading is None for reading in readings) else readings
+        self._set("strut_readings_mm", value, f"set the reading of strut {strut}")
 
     @action
-    def set_readings(self, values: Sequence[float]) -> None:
+    def set_readings(self, values: Sequence[float | None] | None) -> None:
         """Set all six readings, mm."""
-        self._edit("set the readings", lambda doc: {**doc, "strut_readings_mm": list(values)})
+        given = None if values is None else list(values)
+        self._set("strut_readings_mm", given, "set the readings")
 
     @action
     def set_correction(self, correction: Mapping[str, Any] | None) -> None:
         """Set the correction, of any of the four kinds, as the case file has it."""
         given = None if correction is None else dict(correction)
-        self._edit("set the correction", lambda document: {**document, "correction": given})
+        self._set("correction", given, "set the correction")
 
     @action
     def set_schedule(self, schedule: Mapping[str, Any] | None) -> None:
         """Set the schedule's rules as the case file has them."""
         given = None if schedule is None else dict(schedule)
-        self._edit("set the schedule", lambda document: {**document, "schedule": given})
+        self._set("schedule", given, "set the schedule")
 
     @action
     def accept_relaxed_layout(self, accepted: bool = True) -> None:
         """Accept a layout that keeps only the relaxed angle rule (H17), or take that back."""
-        if accepted != self.version.relaxed:
+        if bool(accepted) != self.version.relaxed:
             label = "accept the relaxed layout" if accepted else "do not accept the relaxed layout"
-            self._keep(replace(self.version, relaxed=accepted, label=label))
+            self.keep(replace(self.version, relaxed=bool(accepted), label=label))
 
     @action
     def confirm_ring_front(self, confirmed: bool = True) -> None:
         """Say that the front of both rings was compared with the picture (H22)."""
-
-        def change(document: Document) -> None:
-            document["schema_version"] = max(2, document.get("schema_version", 2))
-            document["ring_front_confirmed"] = confirmed
-
-        self._edit("confirm the rings' front", change)
+        version = {"schema_version": 2, "ring_front_confirmed": bool(confirmed)}
+        label = "confirm the rings' front" if confirmed else "take back the rings' front"
+        self.changed_document(label, lambda document: {**document, **version})
 
     # ------------------------------------------------------------ asked a second time
 
     @action
     def confirm_side(self, side: str) -> None:
-        """The limb's side, asked a second time (H37)."""
-        limb = self.version.content.get("limb")
-        given = limb.get("side") if isinstance(limb, Mapping) else None
-        self.side_confirmed = side if side == given else None
-        if side != given:
-            self.tell(notices.side_conflict(str(side), str(given)), kind="refused", step=Step.LOAD)
+        """The limb's side, said a second time (H37); another CT is asked for anew."""
+        if side not in ("left", "right"):
+            raise InputError.of("unknown-side", "a side is left or right", where="limb.side")
+        self.side_answer = (side, self.side_image)
 
     @action
-    def repeat_readings(self, values: Sequence[float]) -> None:
-        """The six readings, read and typed a second time (H24)."""
-        first = list(self.version.content.get("strut_readings_mm") or [])
-        second = list(values)
-        self.readings_repeated = second
-        for strut, (one, other) in enumerate(zip(first, second, strict=False), 1):
-            if one != other:
-                fault = notices.reading_differs(strut, str(one), str(other))
-                self.tell(fault, kind="refused", step=Step.READINGS)
+    def repeat_readings(self, values: Sequence[float | None]) -> None:
+        """The six readings, read and entered a second time (H24)."""
+        if len(values) != SIX:
+            raise InputError.of(
+                "six-readings",
+                "six readings are needed",
+                value=str(len(values)),
+                where="strut_readings_mm",
+                hazard="H24",
+                next_step="read all six struts again",
+            )
+        self.readings_repeated = list(values)
 
 
-def _marker_edits(document: Document) -> dict[str, list[Any]]:
-    """The marker edits of a document, made where there are none."""
-    document["schema_version"] = 2
-    edits = document.setdefault("marker_edits", {})
-    for key in ("added_lps_mm", "removed_lps_mm"):
-        edits.setdefault(key, [])
-    return edits
-
-
-def _in_order(numbering: Mapping[str, Any]) -> dict[str, Any]:
-    return {number: numbering[number] for number in sorted(numbering, key=int)}
+def _part(document: Document, key: str) -> Document:
+    """An object of the document; empty where it is missing or something else."""
+    part = document.get(key)
+    return part if isinstance(part, dict) else {}

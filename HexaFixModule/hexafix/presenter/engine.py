@@ -7,12 +7,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from hexafix.case import Case
+from hexafix.case import Case, CaseParts
 from hexafix.progress import Progress
 
 
 class Engine(Protocol):
     """The functions of `hexafix.pipeline` that the workflow is made of."""
+
+    # What each does stands there; here only what the presenter passes.
+    # ruff: noqa: D102
 
     def image_series(self, path: Path, *, progress: Progress = ...) -> dict[str, Any]: ...
 
@@ -29,14 +32,21 @@ class Engine(Protocol):
         ball_diameter_mm: float,
         added_lps_mm: Sequence[Any] = ...,
         removed_lps_mm: Sequence[Any] = ...,
+        found: Any = ...,
         progress: Progress = ...,
     ) -> Any: ...
 
     def balls_document(self, balls: Any) -> dict[str, Any]: ...
 
-    def judge_case_numbering(
-        self, case: Case, balls: Any, *, assigned: Mapping[int, Any] | None = ...
+    def with_ball_added(
+        self, edits: Mapping[str, Any], *, lps_mm: Sequence[float]
     ) -> dict[str, Any]: ...
+
+    def with_ball_removed(
+        self, edits: Mapping[str, Any], *, ball: Mapping[str, Any]
+    ) -> dict[str, Any]: ...
+
+    def judge_case_numbering(self, case: CaseParts, balls: Any) -> dict[str, Any]: ...
 
     def recognise_checked(
         self,
@@ -51,6 +61,8 @@ class Engine(Protocol):
     def recognition_document(self, case: Case, recognised: Any) -> dict[str, Any]: ...
 
     def layout_document(self, proximal: Any, distal: Any) -> dict[str, Any]: ...
+
+    def layout_pictures(self, proximal: Any, distal: Any) -> dict[str, str]: ...
 
     def weigh_document(self, case: Case, recognised: Any) -> dict[str, Any]: ...
 
@@ -69,8 +81,6 @@ class Engine(Protocol):
     def playback(self, plan: Any) -> Any: ...
 
     def pictures(self, document: Mapping[str, Any]) -> dict[str, str]: ...
-
-    def layout_pictures(self, document: Mapping[str, Any]) -> dict[str, str]: ...
 
 
 def pipeline_engine() -> Engine:

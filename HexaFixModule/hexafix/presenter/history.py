@@ -19,7 +19,7 @@ class Version:
     Attributes
     ----------
     raw : bytes
-        The case document as read or as it would be written.
+        The case document as read, or as it would be written.
     folder : Path or None
         What relative paths in it are relative to; None for a case never saved.
     relaxed : bool
@@ -35,7 +35,7 @@ class Version:
 
     @cached_property
     def content(self) -> Mapping[str, Any]:
-        """The document; do not change it."""
+        """The document; not to be changed."""
         return parse_json_object(self.raw, what="case file", where="case.json")
 
     def copy(self) -> dict[str, Any]:
@@ -81,6 +81,16 @@ class History:
         self._past.append(self.present)
         self.present = self._future.pop()
         return True
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to take back."""
+        return bool(self._past)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an undone edit."""
+        return bool(self._future)
 
     @property
     def undo_label(self) -> str:

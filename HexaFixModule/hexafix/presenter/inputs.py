@@ -5,47 +5,66 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from hexafix.case import Case, CaseParts, case_from_document, draft_faults, parts_of
+from hexafix.case import (
+    Case,
+    CaseParts,
+    case_from_document,
+    draft_faults,
+    parts_of,
+)
 from hexafix.errors import Fault
 from hexafix.presenter.history import Version
 from hexafix.presenter.state import Step
 
 ORDER = tuple(Step)
 
-OWNERS: tuple[tuple[str, Step, Step], ...] = (
-    ("image", Step.LOAD, Step.LOAD),
-    ("markers.ball_diameter_mm", Step.MARKERS, Step.MARKERS),
-    ("marker_edits", Step.MARKERS, Step.MARKERS),
-    ("markers.proximal", Step.NUMBERING, Step.NUMBERING),
-    ("markers.distal", Step.NUMBERING, Step.NUMBERING),
-    ("markers", Step.MARKERS, Step.MARKERS),
-    ("numbering", Step.NUMBERING, Step.POSES),
-    ("limb", Step.LOAD, Step.NUMBERING),
-    ("fixator", Step.LOAD, Step.NUMBERING),
-    ("strut_readings_mm", Step.READINGS, Step.READINGS),
-    ("correction", Step.CORRECTION, Step.CORRECTION),
-    ("schedule", Step.SCHEDULE, Step.SCHEDULE),
-    ("case_id", Step.LOAD, Step.SCHEDULE),
+OWNERS: tuple[tuple[str, Step, Step, str], ...] = (
+    ("image", Step.LOAD, Step.LOAD, "choose the CT"),
+    (
+        "markers.ball_diameter_mm",
+        Step.MARKERS,
+        Step.MARKERS,
+        "give the diameter of the marker balls",
+    ),
+    ("marker_edits", Step.MARKERS, Step.MARKERS, ""),
+    ("markers.proximal", Step.NUMBERING, Step.NUMBERING, "give the layout of the proximal ring"),
+    ("markers.distal", Step.NUMBERING, Step.NUMBERING, "give the layout of the distal ring"),
+    ("markers", Step.MARKERS, Step.MARKERS, "give diameter and layout of the marker balls"),
+    ("numbering", Step.NUMBERING, Step.POSES, "give every number a ball"),
+    ("limb", Step.LOAD, Step.POSES, "give side and bone of the limb"),
+    ("fixator", Step.LOAD, Step.POSES, "choose the fixator"),
+    ("strut_readings_mm", Step.READINGS, Step.READINGS, "read all six struts"),
+    ("correction", Step.CORRECTION, Step.CORRECTION, "give the correction"),
+    ("schedule", Step.SCHEDULE, Step.SCHEDULE, "give the schedule's start date and rules"),
+    ("case_id", Step.LOAD, Step.SCHEDULE, "name the case"),
 )
-"""Where a fault lies, the step that shows it, and the first step that cannot run with it."""
+"""A place in the case, the step that shows its faults, the first step that they stop, and what to
+do while it is missing."""
 
-OPTIONAL = ("strut_readings_mm", "correction", "schedule", "numbering")
-"""Parts that earlier steps do without while they are missing or wrong."""
+NO_IMAGE = "image"
+"""Stands for the image in a step's own case: its content is hashed beside the case."""
 
 
-def owner(where: str | None) -> tuple[Step, Step]:
-    """The step that shows a fault at this place, and the first step that it stops."""
-    for prefix, shows, stops in OWNERS:
+def owner(where: str | None) -> tuple[Step, Step, str]:
+    """The step that shows a fault at this place, the first one it stops, and what is to do."""
+    for prefix, shows, stops, words in OWNERS:
         if where is not None and (
             where == prefix or where.startswith((f"{prefix}.", f"{prefix}["))
         ):
-            return shows, stops
-    return Step.LOAD, Step.SCHEDULE
+            return shows, stops, words
+    return Step.LOAD, Step.SCHEDULE, ""
+
+
+def is_missing(fault: Fault) -> bool:
+    """Whether a fault only says that something was not entered yet."""
+    if fault.code in ("needed-for-a-plan", "number-missing", "missing"):
+        return True
+    return fault.code == "case-value" and fault.value in (None, "None")
 
 
 @dataclass(frozen=True)
@@ -55,9 +74,12 @@ class Inputs:
     Attributes
     ----------
     version : Version
+    stamp : str
+        Size and time of the image's files when they were looked at last.
     """
 
     version: Version
+    stamp: str = ""
 
     @property
     def folder(self) -> Path:
@@ -66,13 +88,27 @@ class Inputs:
 
     @cached_property
     def faults(self) -> tuple[Fault, ...]:
-        """Everything that is missing or wrong in the case."""
-        return draft_faults(self.version.raw, folder=self.folder)
+        """Everything that is missing or wrong in the case, once for each place that is missing."""
+        found: dict[Any, Fault] = {}
+        for fault in draft_faults(self.version.raw, folder=self.folder):
+            words = owner(fault.where)[2]
+            if is_missing(fault) and words and fault.code != "number-missing":
+                where = next(prefix for prefix, *_, text in OWNERS if text == words)
+                fault = replace(fault, code="missing", what="not given yet", value=None)
+                fault = replace(fault, where=where, next_step=words, limit=None)
+            found[fault.code, fault.where, fault.what, fault.value] = fault
+        return tuple(found.values())
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """A copy of the case document for doors to look at."""
+        return self.version.copy()
 
     @cached_property
     def parts(self) -> CaseParts:
-        """What is right of the case, part by part."""
-        return parts_of(self.version.raw, folder=self.folder)
+        """What is right of what `Step.NUMBERING` reads: perhaps not all is there yet."""
+        raw = json.dumps(self._case_document(Step.NUMBERING)).encode()
+        return parts_of(raw, folder=self.folder)
 
     def faults_shown_at(self, step: Step) -> tuple[Fault, ...]:
         """The faults that belong to a step."""
@@ -99,21 +135,16 @@ class Inputs:
         return self.version.content["markers"]["ball_diameter_mm"]
 
     @property
-    def assigned(self) -> dict[int, Any] | None:
-        """The ball centres that the user assigned, LPS mm; None for automatic numbering."""
-        given = self.version.content.get("numbering")
-        return None if given is None else {int(number): at for number, at in given.items()}
-
-    @property
-    def marker_edits(self) -> Mapping[str, Any]:
-        """The user's added and removed balls."""
+    def marker_edits(self) -> dict[str, list[Any]]:
+        """The user's added and removed balls, points in LPS mm."""
         given = self.version.content.get("marker_edits") or {}
         return {key: given.get(key) or [] for key in ("added_lps_mm", "removed_lps_mm")}
 
     def read_by(self, step: Step) -> dict[str, Any]:
         """Exactly what a step reads of the case, besides the image's content."""
         if step == Step.LOAD:
-            return {"path": str(self.image_path), "series": self.series_instance_uid}
+            uid = self.series_instance_uid
+            return {"path": str(self.image_path), "series": uid, "stamp": self.stamp}
         if step == Step.MARKERS:
             return {"diameter": self.ball_diameter_mm, "edits": self.marker_edits}
         if step in (Step.SCHEDULE, Step.EXPORT):
@@ -124,17 +155,20 @@ class Inputs:
             }
         return {
             "case": self._case_document(step),
-            "assigned": self.version.content.get("numbering"),
             "fixator": self._fixator_file,
             "relaxed": self.version.relaxed and step != Step.NUMBERING,
         }
 
     def fingerprint(self, step: Step) -> str | None:
         """Hash of what a step reads of the case; None while something it needs is missing."""
-        if self.faults_before(step):
-            return None
-        text = json.dumps([step.value, self.read_by(step)], sort_keys=True, allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return self._fingerprints[step]
+
+    @cached_property
+    def _fingerprints(self) -> dict[Step, str | None]:
+        return {
+            step: None if self.faults_before(step) else _hash([step.value, self.read_by(step)])
+            for step in ORDER
+        }
 
     def key(self, step: Step, image: str | None) -> str | None:
         """Hash of everything a step's result depends on; None while that is not known.
@@ -146,9 +180,19 @@ class Inputs:
             Identity of the image's content, once it was read.
         """
         fingerprint = self.fingerprint(step)
-        if fingerprint is None or image is None:
-            return None
-        return hashlib.sha256(f"{fingerprint} {image}".encode()).hexdigest()
+        return None if fingerprint is None or image is None else _hash([fingerprint, image])
+
+    def search_key(self, image: str) -> str:
+        """Hash of what the search for balls depends on, before the user's edits of them."""
+        edits = {"added_lps_mm": [], "removed_lps_mm": []}
+        read = {"diameter": self.ball_diameter_mm, "edits": edits}
+        return _hash([_hash([Step.MARKERS.value, read]), image])
+
+    @property
+    def layout_key(self) -> str:
+        """Hash of what the layout check depends on."""
+        markers = self.version.content.get("markers")
+        return _hash([markers])
 
     def case_for(self, step: Step) -> Case:
         """A case that holds what a step reads, and nothing else."""
@@ -158,32 +202,24 @@ class Inputs:
         return case_from_document(raw, folder=self.folder, needs_image=False, plannable=False)
 
     def _case_document(self, step: Step) -> dict[str, Any]:
+        """The parts of the case that a step reads; parts it can do without only where right."""
         given = self.version.content
         wrong = {owner(fault.where)[0] for fault in self.faults}
-        document = {
-            "schema_version": given["schema_version"],
-            "case_id": "case",
-            "limb": given["limb"],
-            "image": {"path": "image", "series_instance_uid": None},
-            "fixator": given["fixator"],
-            "markers": given["markers"],
-            "numbering": given.get("numbering"),
-        }
-        if given.get("marker_edits") is not None:
-            document["marker_edits"] = given["marker_edits"]
-        automatic = document["numbering"] is None
-        if step == Step.NUMBERING:
-            document["numbering"] = None  # judged beside the case: it may be half done
+        kept = ["schema_version", "markers", "numbering", "fixator"]
+        if step != Step.NUMBERING:
+            kept += ["limb", "marker_edits"]
         late = step in (Step.READINGS, Step.CORRECTION)
-        if Step.READINGS not in wrong and (late or automatic):
-            document["strut_readings_mm"] = given.get("strut_readings_mm")
-        if late and Step.SCHEDULE not in wrong:
-            document["schedule"] = given.get("schedule")
+        # readings settle an automatic numbering where layouts alone do not
+        if Step.READINGS not in wrong and (late or not given.get("numbering")):
+            kept.append("strut_readings_mm")
         if step == Step.CORRECTION:
-            document["correction"] = given.get("correction")
-        return document
+            kept.append("correction")
+            if Step.SCHEDULE not in wrong:
+                kept.append("schedule")
+        image = {"path": NO_IMAGE, "series_instance_uid": None}
+        return {"case_id": "case", "image": image, **{k: given[k] for k in kept if k in given}}
 
-    @property
+    @cached_property
     def _fixator_file(self) -> str | None:
         """Hash of the fixator's file, where the case names one beside it."""
         given = self.version.content.get("fixator")
@@ -193,3 +229,17 @@ class Inputs:
             return hashlib.sha256((self.folder / given).read_bytes()).hexdigest()
         except (OSError, ValueError):
             return None
+
+
+def _hash(value: Any) -> str:
+    text = json.dumps(value, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def stamp_of(path: Path) -> str:
+    """Names, sizes and times of an image's files: another stamp asks for another look."""
+    try:
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        return _hash([[f.name, f.stat().st_size, f.stat().st_mtime_ns] for f in files])
+    except OSError:
+        return ""

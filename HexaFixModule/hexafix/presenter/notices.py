@@ -1,39 +1,75 @@
-"""Faults as banners, and the sentences of the workstation's own checks."""
+"""Faults as banners, and what the workstation itself asks and refuses."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from types import MappingProxyType
 
 from hexafix.errors import Fault
 from hexafix.presenter.state import TITLES, Banner, Kind, Step
 
-_ORDER: tuple[Kind, ...] = ("refused", "error", "warning", "info")
+_GRAVEST: tuple[Kind, ...] = ("refused", "error", "warning", "info")
 
-_TITLES: dict[Kind, str] = {
-    "refused": "Refused",
-    "error": "Not possible",
-    "warning": "Look at this",
-    "info": "Note",
+_WORDS: dict[Kind, str] = {
+    "refused": "refused",
+    "error": "not possible",
+    "warning": "look at this",
+    "info": "note",
 }
 
+NEXT_STEPS = MappingProxyType(
+    {
+        "layout-relaxed": "move a marker, or accept the relaxed rule for this frame",
+        "target-not-an-export": "choose another folder",
+        "target-holds-other-files": "move the files away or choose another folder",
+        "export-not-written": "free disk space or choose another folder; older results are "
+        "unchanged",
+    }
+)
+"""Next steps in the workstation's words, where the command line's would name its options."""
 
-def banner(fault: Fault, *, kind: Kind, step: Step | None = None, title: str = "") -> Banner:
+SIDE_ASKED = Fault(
+    "side-to-confirm",
+    "say the side of the limb a second time",
+    hazard="H37",
+    where="limb.side",
+    next_step="look at the patient or the request, not at this screen, and say the side",
+)
+READINGS_ASKED = Fault(
+    "readings-to-repeat",
+    "enter the six strut readings a second time",
+    hazard="H24",
+    where="strut_readings_mm",
+    next_step="read all six struts on the frame again and enter the values",
+)
+FRONT_ASKED = Fault(
+    "ring-front-to-confirm",
+    "say that the front of both rings is where the picture shows it",
+    hazard="H22",
+    where="ring_front_confirmed",
+    next_step="compare the rings' front marks with the picture, then confirm",
+)
+
+
+def banner(fault: Fault, *, kind: Kind, step: Step | None = None) -> Banner:
     """A fault as a banner; its id follows from its content."""
-    text = f"{fault.where}: {fault.what}" if fault.where else fault.what
+    text = f"{fault.what}"
     if fault.value is not None:
         text += f" (value {fault.value}" + (f", limit {fault.limit})" if fault.limit else ")")
     elif fault.limit is not None:
         text += f" (limit {fault.limit})"
+    if fault.where:
+        text += f" [{fault.where}]"
     name = f"{kind} {step} {fault.code} {text}"
-    head = title or (_TITLES[kind] if step is None else f"{TITLES[step]}: {_TITLES[kind].lower()}")
+    words = _WORDS[kind]
     return Banner(
         id=hashlib.sha256(name.encode()).hexdigest()[:12],
         kind=kind,
         code=fault.code,
-        title=head,
+        title=words.capitalize() if step is None else f"{TITLES[step]}: {words}",
         message=text,
-        next_step=fault.next_step or "",
+        next_step=NEXT_STEPS.get(fault.code) or fault.next_step or "",
         hazard=fault.hazard or "",
         step=step,
     )
@@ -42,23 +78,23 @@ def banner(fault: Fault, *, kind: Kind, step: Step | None = None, title: str = "
 def sorted_banners(banners: Iterable[Banner]) -> tuple[Banner, ...]:
     """The gravest first, each once."""
     once = {item.id: item for item in banners}
-    return tuple(sorted(once.values(), key=lambda item: _ORDER.index(item.kind)))
+    return tuple(sorted(once.values(), key=lambda item: _GRAVEST.index(item.kind)))
 
 
-def side_conflict(asked: str, given: str) -> Fault:
-    """H37: the side given the second time is not the case's."""
+def side_conflict(answer: str, side: str | None) -> Fault:
+    """H37: the side said the second time is not the case's."""
     return Fault(
         "side-not-confirmed",
-        "the side given the second time is not the side of the case",
-        value=asked,
-        limit=given,
+        "the side said the second time is not the side in the case",
+        value=answer,
+        limit=side or "none",
         hazard="H37",
         where="limb.side",
-        next_step="look at the patient's own frame, then correct the case or the answer",
+        next_step="look at the patient or the request; then correct the case or say it again",
     )
 
 
-def reading_differs(strut: int, first: str, second: str) -> Fault:
+def reading_differs(strut: int, first: float | None, second: float | None) -> Fault:
     """H24: the second reading of a strut is not the first."""
     return Fault(
         "reading-not-repeated",
@@ -67,5 +103,5 @@ def reading_differs(strut: int, first: str, second: str) -> Fault:
         limit=f"{first} mm",
         hazard="H24",
         where=f"strut_readings_mm[{strut - 1}]",
-        next_step=f"read strut {strut} once more on the frame and enter it twice",
+        next_step=f"read strut {strut} on the frame once more and correct the wrong entry",
     )

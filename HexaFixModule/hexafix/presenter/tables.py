@@ -9,25 +9,25 @@ from hexafix.presenter.state import Table
 
 
 def _mm(value: float | None) -> str:
-    from hexafix.pipeline.text import format_mm
+    from hexafix.pipeline import format_mm
 
     return "-" if value is None else format_mm(value)
 
 
 def _deg(value: float | None) -> str:
-    from hexafix.pipeline.text import format_deg
+    from hexafix.pipeline import format_deg
 
     return "-" if value is None else format_deg(value)
 
 
 def _number(value: float, digits: int) -> str:
-    from hexafix.pipeline.text import format_number
+    from hexafix.pipeline import format_number
 
     return format_number(value, digits)
 
 
 def _measure(value: float | None) -> str:
-    from hexafix.pipeline.text import format_measure
+    from hexafix.pipeline import format_measure
 
     return format_measure(value)
 
@@ -102,13 +102,13 @@ def rejected(document: Mapping[str, Any]) -> Table:
 
 def numbering(document: Mapping[str, Any]) -> Table:
     """Each number's ball and residual."""
-    rows = []
+    rows, alerts = [], []
     for ring in ("proximal", "distal"):
-        residuals = document["rings"][ring].get("residuals_mm") or {}
-        for number, residual in residuals.items():
+        for number, residual in document["rings"][ring]["residuals_mm"].items():
             ball = document["assigned"].get(number)
             rows.append((number, ring, "-" if ball is None else str(ball + 1), _mm(residual)))
-    return Table(("Number", "Ring", "Ball", "Residual mm"), tuple(rows), ("",) * len(rows))
+            alerts.append("no ball yet" if ball is None else "")
+    return Table(("Number", "Ring", "Ball", "Residual mm"), tuple(rows), tuple(alerts))
 
 
 def poses(document: Mapping[str, Any]) -> Table:
@@ -171,9 +171,50 @@ def layout(document: Mapping[str, Any]) -> Table:
     return Table(columns, tuple(rows), tuple(alerts))
 
 
+VERDICTS = {"agrees": "", "read-again": "read again", "disagrees": "disagrees with the CT"}
+"""What a strut's verdict asks of the user."""
+
+
+def struts(document: Mapping[str, Any]) -> Table:
+    """The readings against the CT."""
+    columns = ("Strut", "Reading mm", "Length mm", "Length by CT mm", "CT - reading mm", "Verdict")
+    rows, alerts = [], []
+    for strut in document["struts"]:
+        verdict = strut["verdict"]
+        values = (strut[key] for key in ("reading_mm", "length_mm", "ct_length_mm"))
+        rows.append(
+            (
+                str(strut["strut"]),
+                *_point(values),
+                _mm(strut["difference_mm"]),
+                verdict.replace("-", " "),
+            )
+        )
+        alerts.append(VERDICTS.get(verdict, verdict))
+    return Table(columns, tuple(rows), tuple(alerts))
+
+
+def target(document: Mapping[str, Any]) -> Table:
+    """Where the correction leads: the pose at the end, and each strut there."""
+    rows: list[tuple[str, str]] = []
+    alerts: list[str] = []
+    pose = document.get("target")
+    if pose is not None:
+        named = (("x", "y", "z"), pose["position_mm"], _mm, "mm")
+        angles = (("α", "β", "γ"), pose["angles_deg"], _deg, "deg")
+        for names, values, text, unit in (named, angles):
+            rows += [(f"{n} {unit}", text(v)) for n, v in zip(names, values, strict=True)]
+        alerts += [""] * len(rows)
+    ends = zip(document.get("struts_mm") or (), document.get("within_stroke") or (), strict=True)
+    for strut, (reading, inside) in enumerate(ends, 1):
+        rows.append((f"Strut {strut} at the end mm", _mm(reading)))
+        alerts.append("" if inside else "beyond the strut's stroke")
+    return Table(("Target", "Value"), tuple(rows), tuple(alerts))
+
+
 def strut_plan(document: Mapping[str, Any]) -> Table:
     """The scale values to set, row by row."""
-    from hexafix.pipeline.text import format_row
+    from hexafix.pipeline import format_row
 
     step = document["schedule"]["strut_step_mm"]
     columns = ("Day", "Date", "Adjustment", *(f"Strut {k} mm" for k in range(1, 7)))

@@ -1,46 +1,55 @@
-"""Running steps: on a working thread, with progress and cancel, each result under its inputs."""
+"""Running steps: on a working thread, with progress and stop, each result under its inputs."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from hexafix.errors import Cancelled, Fault, Refused
-from hexafix.presenter.compute import defect, image_identity, outcome_of
+from hexafix.errors import Cancelled, Refused
+from hexafix.presenter.compute import compute, faults_of_error, kind_of, search
 from hexafix.presenter.core import Core, action
 from hexafix.presenter.inputs import ORDER, Inputs
 from hexafix.presenter.results import Result
 from hexafix.presenter.state import Step
+from hexafix.presenter.view import export_blocked_by
 from hexafix.presenter.worker import Job, cancelled
 
-POLL_S = 0.005
+POLL_S = 0.002
 """How often `wait` looks."""
 
-TOLD_FRACTION = 0.02
+TOLD_FRACTION = 0.01
 """Progress of the same words is told when it grew by this much."""
 
 
 class Work(Core):
-    """Run, cancel, wait, export, close."""
+    """Run, stop, wait, export, close."""
+
+    _target: Step | None = None
+    """How far the job under way goes; None if it computes no steps."""
+    _pending: Step | None = None
+    """How far to go once the job under way has ended."""
+    _playback: tuple[Result, Any] | None = None
+    _pictures: tuple[Any, dict[str, str]] | None = None
 
     @action
     def run(self, step: Step | str) -> None:
         """Compute a step with everything stale or missing before it."""
-        self._start(Step(step))
+        self.start(Step(step))
 
     @action
     def run_all(self) -> None:
         """Compute everything to the prescription."""
-        self._start(Step.EXPORT)
+        self.start(Step.EXPORT)
 
+    @action
     def cancel(self) -> None:
         """Stop the work under way; older results stay as they are."""
-        with self.lock:
-            if self.job is not None:
-                self.job.cancel()
+        self._pending = None
+        if self.job is not None:
+            self.job.cancel()
 
     def wait(self, timeout_s: float = 60.0) -> bool:
         """Wait until nothing is under way; False if that took too long.
@@ -59,170 +68,198 @@ class Work(Core):
         with self.lock:
             self.closed = True
             job = self.job
-            if job is not None:
-                job.cancel()
         if job is not None:
+            job.cancel()
             job.join()
 
     @action
     def export(self, folder: str | Path) -> None:
         """Write the prescription shown as an export folder, all or nothing."""
-        if not self.snapshot.can_export:
+        self.look_again()
+        blocked, result = export_blocked_by(self), self.result(Step.EXPORT)
+        if blocked or result is None:
             raise Refused.of(
                 "export-blocked",
-                "nothing was exported",
-                limit=self.snapshot.export_blocked_by,
+                f"nothing was exported: {blocked}",
                 hazard="H40",
                 next_step="do what is said here, then export again",
             )
-        result = self.result(Step.EXPORT)
-        assert result is not None
-        folder = Path(folder)
+        target = Path(folder)
 
         def work(job: Job) -> None:
             job.progress("write the export", 0.0)
-            self.engine.write_prescription(result.value, folder)
-            self.post(lambda: self._exported(result.key, folder))
+            self.engine.write_prescription(result.value, target)
+            with self.lock:
+                self.exported = (result.key, str(target))
 
-        self._begin(work, Step.EXPORT, None)
+        self._begin(work, Step.EXPORT)
 
-    def _exported(self, key: str, folder: Path) -> None:
-        self.exported = (key, str(folder))
+    @action
+    def list_series(self, path: str | Path) -> None:
+        """List the series of a DICOM folder in the table ``series``."""
+
+        def work(job: Job) -> None:
+            series = self.engine.image_series(Path(path), progress=job.progress)
+            with self.lock:
+                self.series = series
+
+        self._begin(work, Step.LOAD)
 
     # ------------------------------------------------------------ results
 
     def playback(self) -> Any:
         """The frame day by day as the schedule shown sets it; None without one."""
         with self.lock:
-            plan = self.value(Step.SCHEDULE)
-            return None if plan is None else self.engine.playback(plan)
+            shown = self.results.shown(Step.SCHEDULE)
+            if shown is None:
+                return None
+            if self._playback is None or self._playback[0] is not shown:
+                self._playback = (shown, self.engine.playback(shown.value))
+            return self._playback[1]
 
     def prescription_files(self) -> Mapping[str, bytes] | None:
         """The files of the prescription, by name; None unless it is fresh."""
         with self.lock:
-            if not self.is_done(Step.EXPORT):
+            if not all(self.is_done(step) for step in ORDER):
                 return None
             return MappingProxyType(dict(self.value(Step.EXPORT).files))
 
     def pictures(self) -> dict[str, str]:
-        """SVG pictures by name: of the plan shown, else of the layout."""
+        """SVG pictures by name: of the plan shown, else of the layouts."""
         with self.lock:
-            shown = self.results.shown(Step.SCHEDULE)
-            if shown is not None:
-                return dict(self.engine.pictures(shown.document))
+            shown, layout = self.results.shown(Step.SCHEDULE), self.layout
+            made_of = shown or layout[0]
+            if self._pictures is None or self._pictures[0] is not made_of:
+                self._pictures = (made_of, self._drawn(shown))
+            return dict(self._pictures[1])
+
+    def _drawn(self, plan: Result | None) -> dict[str, str]:
+        if plan is not None:
+            return dict(self.engine.pictures(plan.document))
+        parts = self.inputs.parts
+        if parts.proximal is None or parts.distal is None:
             return {}
+        return dict(self.engine.layout_pictures(parts.proximal, parts.distal))
 
     # ------------------------------------------------------------ the job
 
-    def _start(self, target: Step) -> None:
+    def start(self, target: Step) -> None:
+        """Compute up to `target`; work under way goes on, and further if need be."""
+        self.look_again()
+        if self.job is not None:
+            if self._target is not None and not self.job.stopping:
+                self._target = max(self._target, target, key=ORDER.index)
+            else:
+                self._pending = max(self._pending or target, target, key=ORDER.index)
+            return
+        for step in ORDER[: ORDER.index(target) + 1]:
+            found = self.result(step)
+            if found is not None and not found.done:
+                self.results.forget(found)
+        self._target = target
+        self._begin(self._compute_all, None)
+
+    def _begin(self, work: Callable[[Job], Any], step: Step | None) -> None:
         if self.job is not None:
             raise Refused.of(
                 "busy", "work is under way", next_step="wait until it is done, or stop it"
             )
-        inputs = self.inputs
-        missing = inputs.faults_before(target)
-        if missing:
-            raise Refused(*missing)
-        steps = ORDER[: ORDER.index(target) + 1]
-        for step in steps:
-            found = self.result(step)
-            if found is not None and found.value is None:
-                self.results.forget(step, found.key)
-        known = {step: found for step in steps if (found := self.result(step)) is not None}
-        image = self.image(inputs)
-        if all(self.is_done(step) for step in steps):
-            return
 
-        def work(job: Job) -> None:
-            self._compute(job, inputs, steps, dict(known), image)
+        def guarded(job: Job) -> None:
+            error = None
+            try:
+                work(job)
+            except Exception as caught:
+                error = caught
+            self.post(lambda: self._ended(job, error))
 
-        self._begin(work, target, inputs)
+        self.running, self.progress = step, None
+        self.job = Job(guarded, report=self._report, threaded=self._threaded)
+        self.job.start()
 
-    def _compute(
-        self,
-        job: Job,
-        inputs: Inputs,
-        steps: tuple[Step, ...],
-        results: dict[Step, Result],
-        image: str | None,
-    ) -> None:
-        """On the working thread: every missing step in order, until one refuses."""
-        for step in steps:
-            found = results.get(step)
-            if found is None:
+    def _compute_all(self, job: Job) -> None:
+        """On the working thread: always the first step that is not done, of the case as it is."""
+        while (begun := self._begin_step(job)) is not None:
+            step, inputs, image, values = begun
+            self.post(self.refresh)
+            try:
+                result = self._computed(job, step, inputs, image, values)
                 job.check()
-                self.post(lambda step=step: self._running(job, step))
-                values = {done: result.value for done, result in results.items()}
-                if step == Step.LOAD:
-                    found = self._loaded(job, inputs)
-                    image = found.image
-                else:
-                    found = self.computed(step, inputs, values, image or "", progress=job.progress)
-                job.check()
-                results[step] = found
-                self.post(lambda found=found: self._store(inputs, found))
-            if found.faults or not found.document.get("complete", True):
-                return
+            except Cancelled:
+                if job.stopping:
+                    raise
+                continue  # the case was changed meanwhile: what was computed is of the past
+            with self.lock:
+                self._store(inputs, result)
+            self.post(self.refresh)
 
-    def _loaded(self, job: Job, inputs: Inputs) -> Result:
-        fingerprint = inputs.fingerprint(Step.LOAD) or ""
-        made = self.computed(Step.LOAD, inputs, {}, fingerprint, progress=job.progress)
-        image = fingerprint
-        if made.value is not None:
-            image = image_identity(made.value, made.document)
-        key = inputs.key(Step.LOAD, image) or ""
-        return Result(Step.LOAD, key, image, made.value, made.document, made.faults, made.kind)
+    def _begin_step(self, job: Job) -> tuple[Step, Inputs, str, dict[Step, Any]] | None:
+        with self.lock:
+            job.next_step()
+            target = self._target or Step.LOAD
+            values = {}
+            for step in ORDER[: ORDER.index(target) + 1]:
+                found = self.result(step)
+                if found is not None and found.done:
+                    values[step] = found.value
+                    continue
+                missing = self.inputs.faults_before(step)
+                if found is not None or missing:
+                    self.tell(*missing, kind="error", step=step)
+                    break
+                self.running, self.progress = step, None
+                return step, self.inputs, self.image or "", values
+            self._target = None
+            return None
+
+    def _computed(
+        self, job: Job, step: Step, inputs: Inputs, image: str, values: dict[Step, Any]
+    ) -> Result:
+        found = None
+        if step == Step.MARKERS and any(inputs.marker_edits.values()):
+            with self.lock:
+                searched = self.results.of(step, inputs.search_key(image))
+            if searched is None:
+                searched = self._searched(job, inputs, image, values[Step.LOAD])
+            found = None if searched is None else searched.value
+        return compute(
+            step, self.engine, inputs, values, image=image, found=found, progress=job.progress
+        )
+
+    def _searched(self, job: Job, inputs: Inputs, image: str, volume: Any) -> Result | None:
+        """The balls before the user's edits; None if the search refuses, as the step will tell."""
+        try:
+            result = search(self.engine, inputs, volume, image=image, progress=job.progress)
+        except Cancelled:
+            raise
+        except Exception:
+            return None
+        with self.lock:
+            self.results.store(result)
+        return result
 
     def _store(self, inputs: Inputs, result: Result) -> None:
         fingerprint = inputs.fingerprint(Step.LOAD)
         if result.step == Step.LOAD and fingerprint is not None:
             self.images[fingerprint] = result.image
         self.results.store(result)
-        self.refresh()
-
-    def _running(self, job: Job, step: Step) -> None:
-        if job is self.job:
-            self.running, self.progress = step, None
-            self.refresh()
-
-    def _begin(self, work: Any, target: Step, inputs: Inputs | None) -> None:
-        def guarded(job: Job) -> None:
-            try:
-                work(job)
-            except Exception as error:
-                caught = error
-                self.post(lambda: self._ended(job, caught))
-            else:
-                self.post(lambda: self._ended(job, None))
-
-        self.job = job = Job(guarded, report=self._report, threaded=self._threaded)
-        self.running = target
-        job.start()
 
     def _ended(self, job: Job, error: Exception | None) -> None:
         if job is not self.job:
             return
-        self.job, self.running, self.progress = None, None, None
+        self.job, self.running, self.progress, self._target = None, None, None, None
         if isinstance(error, Cancelled):
-            self.tell(cancelled().faults[0], kind="info")
+            self.tell(*cancelled().faults, kind="info")
         elif error is not None:
-            outcome = outcome_of(error)
-            for fault in outcome.faults or (defect(error),):
-                self.tell(fault, kind=outcome.kind)
+            self.tell(*faults_of_error(error), kind=kind_of(error))
+        pending, self._pending = self._pending, None
+        if pending is not None:
+            self.start(pending)
         self.refresh()
 
     def _report(self, text: str, fraction: float) -> None:
         last = self.progress
         if last is not None and last[0] == text and 0 <= fraction - last[1] < TOLD_FRACTION:
             return
-        self.post(lambda: self._progressed(text, fraction))
-
-    def _progressed(self, text: str, fraction: float) -> None:
-        if self.job is not None:
-            self.progress = (text, fraction)
-            self.refresh()
-
-
-def fault_of(code: str, what: str, **more: str) -> Fault:
-    """A fault of the workstation itself."""
-    return Fault(code, what, **more)
+        self.progress = (text, fraction)
+        self.post(self.refresh)

@@ -1,4 +1,4 @@
-"""Long work off the door's thread, with progress, cancel and an end."""
+"""Long work off the door's thread: progress, stop, end."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Post = Callable[[Callable[[], Any]], Any]
 """Runs a callable on the door's own thread."""
 
 JOIN_S = 10.0
-"""How long `Job.join` waits for the work to notice that it was stopped."""
+"""How long a door that closes waits for work that was told to stop."""
 
 
 def cancelled() -> Cancelled:
-    """The error that stops a job."""
+    """The error that stops work."""
     return Cancelled.of(
         "cancelled",
         "the work was stopped; older results are as they were",
@@ -30,7 +30,7 @@ class Job:
     Parameters
     ----------
     work : callable
-        Called with the progress to report to; raises what the progress raises.
+        Called with the job; what it runs reports to `progress`, which stops it.
     report : callable
         Called on the working thread with text and fraction.
     threaded : bool
@@ -38,17 +38,12 @@ class Job:
     """
 
     def __init__(
-        self,
-        work: Callable[[Job], None],
-        *,
-        report: Callable[[str, float], None],
-        threaded: bool,
+        self, work: Callable[[Job], Any], *, report: Callable[[str, float], Any], threaded: bool
     ) -> None:
-        self._work, self._report = work, report
-        self._stop = threading.Event()
+        self._work, self._report, self._threaded = work, report, threaded
+        self._stop, self._skip = threading.Event(), threading.Event()
         # A daemon, so that work inside a library cannot keep a closed program alive.
         self._thread = threading.Thread(target=self._run, name="hexafix-work", daemon=True)
-        self._threaded = threaded
 
     def start(self) -> None:
         """Begin."""
@@ -61,14 +56,23 @@ class Job:
         """Stop at the next report of progress."""
         self._stop.set()
 
+    def skip(self) -> None:
+        """Stop the step under way, whose inputs have changed, and go on with the work."""
+        self._skip.set()
+
+    def next_step(self) -> None:
+        """A step begins; Cancelled if the job was told to stop."""
+        self._skip.clear()
+        self.check()
+
     @property
     def stopping(self) -> bool:
-        """Whether it was told to stop."""
+        """Whether the whole job was told to stop."""
         return self._stop.is_set()
 
     def check(self) -> None:
-        """Raise Cancelled if the job was told to stop."""
-        if self._stop.is_set():
+        """Raise Cancelled if the job or its step was told to stop."""
+        if self._stop.is_set() or self._skip.is_set():
             raise cancelled()
 
     def progress(self, step: str, fraction: float) -> None:
@@ -78,7 +82,7 @@ class Job:
 
     def join(self, timeout_s: float = JOIN_S) -> bool:
         """Wait for the end; False if it did not come."""
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
+        if self._thread is not threading.current_thread() and self._thread.is_alive():
             self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
