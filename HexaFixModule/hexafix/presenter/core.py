@@ -76,8 +76,8 @@ class Core:
         self.current = Step.LOAD
         self.side_answer: tuple[str, str] | None = None
         """The side given the second time, and the image it was given for."""
-        self.readings_opened: list[float] | None = None
-        self.readings_repeated: list[float] | None = None
+        self.readings_opened: list[Any] | None = None
+        self.readings_repeated: list[Any] | None = None
         self.series: Mapping[str, Any] | None = None
         self.layout: tuple[str, Mapping[str, Any] | None] = ("", None)
         self.exported: tuple[str, str] | None = None

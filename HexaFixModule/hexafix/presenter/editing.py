@@ -115,7 +115,9 @@ class Edits(Core):
         """Set the reading of one strut, 1 to 6, mm; None: not read yet."""
         if strut not in range(1, SIX + 1):
             raise InputError.of("no-such-strut", "struts are 1 to 6", value=str(strut))
-        readings = list(self.version.copy().get("strut_readings_mm") or [None] * SIX)
+        given = self.version.copy().get("strut_readings_mm")
+        readings: list[float | None] = given if isinstance(given, list) else []
+        readings += [None] * (SIX - len(readings))
         readings[strut - 1] = mm
         value = None if all(reading is None for reading in readings) else readings
         self._set("strut_readings_mm", value, f"set the reading of strut {strut}")

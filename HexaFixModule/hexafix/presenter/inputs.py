@@ -205,9 +205,9 @@ class Inputs:
         """The parts of the case that a step reads; parts it can do without only where right."""
         given = self.version.content
         wrong = {owner(fault.where)[0] for fault in self.faults}
-        kept = ["schema_version", "markers", "numbering", "fixator"]
+        kept = ["schema_version", "markers", "marker_edits", "numbering", "fixator"]
         if step != Step.NUMBERING:
-            kept += ["limb", "marker_edits"]
+            kept.append("limb")
         late = step in (Step.READINGS, Step.CORRECTION)
         # readings settle an automatic numbering where layouts alone do not
         if Step.READINGS not in wrong and (late or not given.get("numbering")):

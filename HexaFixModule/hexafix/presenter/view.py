@@ -162,7 +162,8 @@ def _contradictions(core: Core) -> Iterator[Banner]:
         yield notices.banner(notices.side_conflict(answer[0], side), kind="refused", step=Step.LOAD)
     confirmed = confirmations(core)
     first, second = core.version.content.get("strut_readings_mm"), core.readings_repeated
-    if confirmed["readings_needed"] and not confirmed["readings"] and second is not None:
+    asked = confirmed["readings_needed"] and not confirmed["readings"]
+    if asked and isinstance(first, list) and second is not None:
         for strut, (one, other) in enumerate(zip(first, second, strict=False), 1):
             if one != other:
                 yield notices.banner(
