@@ -156,7 +156,8 @@ class Schedule(_Strict):
 class CaseFile(_Strict):
     """The whole case file (``case.json``) of version 1; `EditedCaseFile` adds what 2 knows."""
 
-    schema_version: Literal[1, 2]
+    # not a Literal: to that, true is 1
+    schema_version: Annotated[int, Field(ge=1, le=2)]
     case_id: Annotated[str, Field(pattern=CASE_ID_PATTERN)]
     limb: Limb
     image: Image

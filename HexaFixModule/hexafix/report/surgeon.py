@@ -78,7 +78,17 @@ def ring_table(document: Mapping[str, Any]) -> Table:
         "Frame LPS (x = L, y = P, z = S), X-Y-Z fixed angles. σ along and about the ring's own "
         "axes. RMS: distance of the balls from the fitted layout."
     )
+    note += front_words(document)
     return Table("Ring poses in the CT", (*POSE_HEAD, "RMS mm"), tuple(rows), note)
+
+
+def front_words(document: Mapping[str, Any]) -> str:
+    """What the user said of both rings' front (H22); nothing where the case does not tell."""
+    confirmed = document["case"].get("ring_front_confirmed")
+    if confirmed is None:
+        return ""
+    said = "yes" if confirmed else "NO"
+    return f" Front of both rings (notch) confirmed against the picture: {said}."
 
 
 def mechanism_table(document: Mapping[str, Any]) -> Table:
@@ -276,6 +286,9 @@ def ball_table(document: Mapping[str, Any]) -> Table:
     margin = document.get("numbering_margin_mm")
     note = f"Numbering settled by: {document['numbering_settled_by']}"
     note += f", margin to the next best {format_measure(margin)} mm." if margin is not None else "."
+    added = [str(ball["number"]) for ball in document["balls"] if ball.get("added")]
+    if added:
+        note += f" Put there by the user, not found by itself: ball {', '.join(added)}."
     return Table("Marker balls in the CT", head, rows, note)
 
 
