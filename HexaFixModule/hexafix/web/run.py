@@ -92,7 +92,7 @@ def guard_application(app: Any, access: Access, workstation: Any) -> None:
     text = index_text(Path(vue3.www))
     Guard(access, policy(text)).install(app)
     add_page(app, text)
-    add_downloads(app, workstation.presenter.prescription_files)
+    add_downloads(app, workstation.panel.downloads)
 
 
 def _why_it_ended(running: Any, access: Access) -> None:

@@ -17,12 +17,11 @@ class Banners:
         from trame.widgets import html
 
         name = self._context.name
-        with html.Div(classes="hx-banners", **marked("banners", role="alert", label="Messages")):
+        with html.Div(classes="hxp-banners", **marked("banners", role="alert", label="Messages")):
             self._notice()
             with html.Template(v_for=f"banner in {name.banners}", key="banner.id"):
-                here = f"!banner.step || banner.step === {name.current}"
-                self._full(f"({here}) && banner.kind !== 'info'")
-                self._line(f"!({here}) || banner.kind === 'info'")
+                self._full(f"!banner.step || banner.step === {name.current}")
+                self._line()
 
     def _full(self, shown: str) -> None:
         from trame.widgets import html
@@ -30,7 +29,7 @@ class Banners:
 
         with html.Div(
             v_if=shown,
-            classes=("['hx-banner', 'hx-banner-' + banner.kind]",),
+            classes=("['hxp-banner', 'hxp-banner-' + banner.kind]",),
             **marked("banner", data_kind=("banner.kind",), data_code=("banner.code",)),
         ):
             v.VIcon(
@@ -39,24 +38,24 @@ class Banners:
                 color=("banner.color",),
                 **marked("banner-icon", label=("banner.word",)),
             )
-            with html.Div(classes="hx-banner-text"):
-                with html.Div(classes="hx-banner-title"):
+            with html.Div(classes="hxp-banner-text"):
+                with html.Div(classes="hxp-banner-title"):
                     html.Span("{{ banner.title }}")
-                    html.Span("{{ banner.hazard }}", v_if="banner.hazard", classes="hx-hazard")
+                    html.Span("{{ banner.hazard }}", v_if="banner.hazard", classes="hxp-hazard")
                 html.Div("{{ banner.message }}", **marked("banner-message"))
                 with html.Div(
-                    v_if="banner.next_step", classes="hx-next", **marked("banner-next-step")
+                    v_if="banner.next_step", classes="hxp-next", **marked("banner-next-step")
                 ):
                     html.B("Next step: ")
                     html.Span("{{ banner.next_step }}")
 
-    def _line(self, shown: str) -> None:
+    def _line(self) -> None:
         from trame.widgets import html
         from trame.widgets import vuetify3 as v
 
         with html.Div(
             v_else=True,
-            classes=("['hx-banner', 'hx-banner-line', 'hx-banner-' + banner.kind]",),
+            classes=("['hxp-banner', 'hxp-banner-line', 'hxp-banner-' + banner.kind]",),
             tabindex="0",
             role="link",
             click=(self._go, "[banner.step]"),
@@ -74,18 +73,18 @@ class Banners:
         notice = self._context.name.notice
         with html.Div(
             v_if=f"{notice}.message",
-            classes="hx-banner hx-banner-error",
+            classes="hxp-banner hxp-banner-error",
             **marked("notice-error", data_code=(f"{notice}.code",)),
         ):
             v.VIcon(icon="mdi-alert-circle", size="small", color="error")
-            with html.Div(classes="hx-banner-text"):
-                with html.Div(classes="hx-banner-title"):
+            with html.Div(classes="hxp-banner-text"):
+                with html.Div(classes="hxp-banner-title"):
                     html.Span("Not taken")
                     html.Span(
-                        f"{{{{ {notice}.hazard }}}}", v_if=f"{notice}.hazard", classes="hx-hazard"
+                        f"{{{{ {notice}.hazard }}}}", v_if=f"{notice}.hazard", classes="hxp-hazard"
                     )
                 html.Div(f"{{{{ {notice}.message }}}}")
-                with html.Div(v_if=f"{notice}.next_step", classes="hx-next"):
+                with html.Div(v_if=f"{notice}.next_step", classes="hxp-next"):
                     html.B("Next step: ")
                     html.Span(f"{{{{ {notice}.next_step }}}}")
             icon_button("mdi-close", "Close this message", "close-notice", self._context.forgive)

@@ -129,21 +129,21 @@ class Chooser:
                 html.Span(f"{{{{ {name.title} }}}}")
             with v.VCardText(classes="py-2"):
                 note(f"{{{{ {name.hint} }}}}", v_if=name.hint)
-                with html.Div(classes="hx-row"):
+                with html.Div(classes="hxp-row"):
                     icon_button(
                         "mdi-arrow-up",
                         "Up one folder",
                         "chooser-up",
                         (self._open, f"[{name.parent}]"),
                     )
-                    html.Span(f"{{{{ {name.folder} }}}}", classes="hx-path")
+                    html.Span(f"{{{{ {name.folder} }}}}", classes="hxp-path")
                 self._entries()
                 html.Div(
                     f"{{{{ {name.left_out} }}}} other files are not listed",
                     v_if=name.left_out,
-                    classes="hx-note",
+                    classes="hxp-note",
                 )
-                html.Div("the folder holds more; write the path", v_if=name.cut, classes="hx-note")
+                html.Div("the folder holds more; write the path", v_if=name.cut, classes="hxp-note")
                 v.VTextField(
                     label="Path",
                     v_model=(name.picked,),
@@ -166,7 +166,7 @@ class Chooser:
 
         name = self._name
         with (
-            html.Div(classes="hx-entries"),
+            html.Div(classes="hxp-entries"),
             v.VList(density="compact", **marked("chooser-entries", label="Folders and files")),
             v.VListItem(
                 v_for=f"entry in {name.entries}",

@@ -68,7 +68,7 @@ class CorrectionStep:
                 color="primary",
                 variant="outlined",
                 divided=True,
-                classes="hx-kinds",
+                classes="hxp-kinds",
                 **marked("correction-kind", label="Kind of correction"),
             ),
         ):
@@ -98,7 +98,7 @@ class CorrectionStep:
         table(
             context,
             "target",
-            "Struts at the end of the correction",
+            "What the correction asks for",
             empty="Shown as soon as ring poses and correction are known.",
         )
 
@@ -125,7 +125,7 @@ class CorrectionStep:
         note("Turn about the centre (about x, then y, then z, fixed axes), then shift. LPS axes.")
         self._three("translation", LPS, "mm", label="Shift")
         self._three("angles", LPS, "deg", label="Turn about")
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             self._three("center", LPS, "mm", label="Centre")
             self._pick_button("center")
         button(
@@ -143,7 +143,7 @@ class CorrectionStep:
         draft = self._name.draft
         note("What is wrong now; the correction undoes it. The direction stands in the word.")
         for key, label, unit, words in drafts.DEFORMITY:
-            with html.Div(classes="hx-row"):
+            with html.Div(classes="hxp-row"):
                 self._text(f"{draft}.{key}", label, f"draft-{key}", suffix=unit)
                 v.VSelect(
                     label="Direction",
@@ -157,14 +157,14 @@ class CorrectionStep:
                     style="max-width: 190px",
                     **marked(f"draft-{key}-word", label=f"{label}, direction"),
                 )
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             self._three("origin", LPS, "mm", label="Origin")
             self._pick_button("origin")
 
     def _three(self, key: str, axes: Sequence[str], unit: str, *, label: str = "") -> None:
         from trame.widgets import html
 
-        with html.Div(classes="hx-grid-3"):
+        with html.Div(classes="hxp-grid-3"):
             for i, axis in enumerate(axes):
                 self._text(
                     f"{self._name.draft}.{key}[{i}]",

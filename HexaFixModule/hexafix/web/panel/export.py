@@ -67,10 +67,10 @@ class ExportStep:
         html.Div(
             f"Blocked: {{{{ {name.export_blocked_by} }}}}",
             v_if=f"!{name.can_export}",
-            classes="hx-blocked",
+            classes="hxp-blocked",
             **marked("export-blocked", role="status"),
         )
-        with html.Ul(v_if=f"{name.can_export}", classes="hx-files", **marked("files")):  # noqa: SIM117
+        with html.Ul(v_if=f"{name.can_export}", classes="hxp-files", **marked("files")):  # noqa: SIM117
             with html.Li(v_for=f"file in {self._name.files}", key="file.name"):
                 html.A(
                     "{{ file.name }}",
@@ -78,7 +78,7 @@ class ExportStep:
                     download=("file.name",),
                     **marked(("'download-' + file.name",)),
                 )
-                html.Span(" {{ file.words }}", classes="hx-note")
+                html.Span(" {{ file.words }}", classes="hxp-note")
         button(
             "Export to a folder",
             "export-folder",
@@ -89,7 +89,7 @@ class ExportStep:
         html.Div(
             f"Exported to {{{{ {name.export_folder} }}}}",
             v_if=name.export_folder,
-            classes="hx-done",
+            classes="hxp-done",
             **marked("exported-to", role="status"),
         )
         note("Every file is marked: not approved. The printed prescription is signed by hand.")
@@ -100,13 +100,13 @@ class ExportStep:
         from trame.widgets import vuetify3 as v
 
         confirmed = self._context.name.confirmed
-        with html.Div(classes="hx-side", **marked("side")):
+        with html.Div(classes="hxp-side", **marked("side")):
             html.B("Look at the patient: which limb carries the frame?")
-            with html.Div(classes="hx-row"):
+            with html.Div(classes="hxp-row"):
                 for side in ("left", "right"):
                     button(side, f"confirm-{side}", (self._confirm, f"['{side}']"))
                 with html.Span(
-                    v_if=f"{confirmed}.side", classes="hx-done", **marked("side-confirmed")
+                    v_if=f"{confirmed}.side", classes="hxp-done", **marked("side-confirmed")
                 ):
                     v.VIcon(icon="mdi-check-circle", size="small", color="success")
                     html.Span(
@@ -115,7 +115,7 @@ class ExportStep:
                 html.Span(
                     "not confirmed",
                     v_else=True,
-                    classes="hx-note",
+                    classes="hxp-note",
                     **marked("side-not-confirmed"),
                 )
 

@@ -58,7 +58,7 @@ class Landmarks:
 
         name = self._name
         note("Each row: a point of the moving fragment, and where it belongs on the other.")
-        with html.Table(classes="hx-table", **marked("landmark-table")):
+        with html.Table(classes="hxp-table", **marked("landmark-table")):
             with html.Thead(), html.Tr():
                 html.Th("Pair", scope="col")
                 html.Th(f"{{{{ {moving} }}}} fragment, L P S mm", scope="col")
@@ -75,11 +75,11 @@ class Landmarks:
                             f"{{{{ {name.picking} === i + '-{which}' ? 'click in a view …' : "
                             f"(pair.{which} || 'pick') }}}}",
                             type="button",
-                            classes="hx-ball",
+                            classes="hxp-ball",
                             click=(self._pick, f"[i, '{which}']"),
                             **marked((f"'pick-' + i + '-{which}'",)),
                         )
-                with html.Td(classes="hx-end"):
+                with html.Td(classes="hxp-end"):
                     icon_button(
                         "mdi-delete-outline",
                         ("'Remove pair ' + (i + 1)",),

@@ -44,16 +44,16 @@ class LayoutEditor:
         """Make both rings' tables of fields."""
         from trame.widgets import html
 
-        with html.Details(classes="hx-details", **marked("layout-editor")):
+        with html.Details(classes="hxp-details", **marked("layout-editor")):
             html.Summary("Marker layout of both rings", **marked("layout-summary"))
             for ring in ("proximal", "distal"):
-                html.Div(f"{ring} ring", classes="hx-title")
+                html.Div(f"{ring} ring", classes="hxp-title")
                 self._ring(ring, getattr(self._name, ring))
 
     def _ring(self, ring: str, rows: str) -> None:
         from trame.widgets import html
 
-        with html.Div(v_for=f"(marker, i) in {rows}", key="i", classes="hx-marker"):
+        with html.Div(v_for=f"(marker, i) in {rows}", key="i", classes="hxp-marker"):
             for column, (key, label) in enumerate(KEYS):
                 text_field(
                     self._context,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexafix.web.files import IMAGE_SUFFIXES, start_folder
 from hexafix.web.panel.chooser import Chooser
@@ -13,6 +13,9 @@ from hexafix.web.panel.context import PanelContext
 from hexafix.web.panel.widgets import button, choice, marked, note, table, title
 from hexafix.web.panel.widgets import field as text_field
 from hexafix.web.state import NAMESPACE
+
+if TYPE_CHECKING:
+    from hexafix.presenter import Snapshot
 
 BONES = ("tibia", "femur", "humerus", "radius", "ulna", "forearm", "foot")
 
@@ -47,7 +50,7 @@ class LoadStep:
         from trame.widgets import html
 
         context, form = self._context, self._context.name.form
-        with html.Div(classes="hx-grid-2"):
+        with html.Div(classes="hxp-grid-2"):
             text_field(context, "case-id", "Case id (no patient name)", f"{form}.case_id", self._id)
             text_field(context, "fixator", "Frame (id or file)", f"{form}.fixator", self._fixator)
             sides = ("[{title: 'left', value: 'left'}, {title: 'right', value: 'right'}]",)
@@ -61,6 +64,7 @@ class LoadStep:
             "Series in the folder",
             click=(self._pick, "[i]"),
             picked=f"{self._name.picked} === i",
+            hidden=("SeriesInstanceUID",),
         )
         button(
             "Load the CT",
@@ -76,7 +80,7 @@ class LoadStep:
         from trame.widgets import html
         from trame.widgets import vuetify3 as v
 
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             v.VTextField(
                 label="DICOM folder or image file on this computer",
                 v_model=(self._name.path,),
@@ -90,8 +94,11 @@ class LoadStep:
             button("List series", "list-series", self._list, disabled=(self._context.name.busy,))
         note("A DICOM folder, or a .nrrd, .nii.gz or .mha file. Nothing leaves this computer.")
 
-    def update(self, form: Mapping[str, Any]) -> None:
+    def update(self, form: Mapping[str, Any], snapshot: Snapshot) -> None:
         """Show the document's image path where another one is not being written."""
+        table = snapshot.tables.get("series")
+        listed = list(zip(table.rows, table.alerts, strict=True)) if table else []
+        self._data.uids = ["" if alert else row[-1] for row, alert in listed]
         if form["image"] != getattr(self, "_shown", None):
             self._shown = form["image"]
             self._data.path = form["image"]
@@ -135,7 +142,9 @@ class LoadStep:
         return start_folder(self._context.presenter.snapshot.case_path) / path
 
     def _pick(self, row: int) -> None:
-        self._data.picked = row
+        """Pick a series; one that cannot be read stays unpicked, its reason stands below it."""
+        if self._data.uids[row]:
+            self._data.picked = row
 
     def _load(self) -> None:
         row = self._data.picked

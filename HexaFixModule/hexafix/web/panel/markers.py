@@ -41,7 +41,7 @@ class MarkersStep:
         from trame.widgets import html
 
         context, name = self._context, self.name
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             field(
                 context,
                 "ball-diameter",
@@ -71,7 +71,7 @@ class MarkersStep:
             f"{{{{ {name.mode} === 'add' ? 'Click on the ball in a slice view; Escape stops.'"
             " : 'Click where the ball is in a slice view; Escape stops.' }}",
             v_if=name.mode,
-            classes="hx-mode",
+            classes="hxp-mode",
             **marked("marker-mode", role="status"),
         )
         table(
@@ -88,7 +88,7 @@ class MarkersStep:
         with (
             html.Details(
                 v_if=f"{context.name.table_rejected}.rows.length",
-                classes="hx-details",
+                classes="hxp-details",
                 **marked("rejected"),
             ),
         ):

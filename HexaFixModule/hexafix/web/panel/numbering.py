@@ -64,7 +64,7 @@ class NumberingStep:
         from trame.widgets import html
 
         name, context = self.name, self._context
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             button(
                 "Number automatically",
                 "number-automatically",
@@ -73,7 +73,7 @@ class NumberingStep:
                 primary=True,
                 disabled=(f"{context.name.busy} || !{name.balls}.length",),
             )
-            html.Span(f"{{{{ {name.settled} }}}}", classes="hx-note", **marked("settled-by"))
+            html.Span(f"{{{{ {name.settled} }}}}", classes="hxp-note", **marked("settled-by"))
         note(
             "Click two numbers to swap them; click a number, then a ball (here or in a view), to "
             "give that ball the number."
@@ -81,22 +81,22 @@ class NumberingStep:
         with html.Div(
             v_for=f"ring in {name.rings}",
             key="ring.ring",
-            classes=(f"['hx-ring', {name.stale} ? 'hx-stale' : '']",),
+            classes=(f"['hxp-ring', {name.stale} ? 'hxp-stale' : '']",),
             **marked(("'ring-' + ring.ring",), data_stale=(name.stale,)),
         ):
-            with html.Div(classes="hx-ring-head"):
+            with html.Div(classes="hxp-ring-head"):
                 html.B("{{ ring.ring }} ring")
                 html.Span("{{ ring.words }}", **marked(("'ring-words-' + ring.ring",)))
-            with html.Div(classes="hx-tiles"):
+            with html.Div(classes="hxp-tiles"):
                 self._tile()
-        html.Div("Balls", classes="hx-title", v_if=f"{name.balls}.length")
-        with html.Div(classes="hx-tiles", **marked("ball-strip")):
+        html.Div("Balls", classes="hxp-title", v_if=f"{name.balls}.length")
+        with html.Div(classes="hxp-tiles", **marked("ball-strip")):
             html.Button(
                 "{{ ball.name }}{{ ball.number ? ' = no. ' + ball.number : ' free' }}",
                 v_for=f"(ball, i) in {name.balls}",
                 key="i",
                 type="button",
-                classes="hx-ball",
+                classes="hxp-ball",
                 click=(self.ball_clicked, "[i]"),
                 **marked(("'ball-chip-' + i",)),
             )
@@ -106,10 +106,10 @@ class NumberingStep:
         from trame.widgets import html
 
         name = self.name
-        with html.Div(v_for="item in ring.numbers", key="item.number", classes="hx-tile-box"):
+        with html.Div(v_for="item in ring.numbers", key="item.number", classes="hxp-tile-box"):
             with html.Button(
                 type="button",
-                classes=(f"['hx-tile', {name.picked} === item.number ? 'hx-picked' : '']",),
+                classes=(f"['hxp-tile', {name.picked} === item.number ? 'hxp-picked' : '']",),
                 click=(self.number_clicked, "[item.number]"),
                 **marked(
                     ("'number-' + item.number",),
@@ -118,9 +118,9 @@ class NumberingStep:
                     data_ball=("item.ball",),
                 ),
             ):
-                html.Span("{{ item.number }}", classes="hx-number")
+                html.Span("{{ item.number }}", classes="hxp-number")
                 html.Span("{{ item.ball || 'no ball' }}")
-                html.Span("{{ item.residual }}", classes="hx-residual")
+                html.Span("{{ item.residual }}", classes="hxp-residual")
             icon_button(
                 "mdi-close",
                 ("'Take number ' + item.number + ' off its ball'",),
@@ -128,7 +128,7 @@ class NumberingStep:
                 (self._clear, "[item.number]"),
                 in_row=True,
                 v_if=f"item.ball && {name.picked} === item.number",
-                classes="hx-clear",
+                classes="hxp-clear",
             )
 
     def number_clicked(self, number: str) -> None:

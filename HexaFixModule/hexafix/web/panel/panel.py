@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +80,8 @@ class Panel:
                 "export": self._export.build,
             },
         )
-        self._drawn: tuple[Any, Any] = (None, None)
+        self._pictures: dict[str, str] = {}
+        self._plan: Any = None
         server.trigger("hx_escape")(self.escape)
 
     def toolbar(self) -> None:
@@ -135,7 +136,7 @@ class Panel:
             if form["readings"] != data.form.get("readings"):
                 self._readings.clear()
             data.form = form
-            self._load.update(form)
+            self._load.update(form, snapshot)
             self._numbering.update(
                 snapshot, presenter.value(Step.NUMBERING), presenter.is_fresh(Step.NUMBERING)
             )
@@ -144,6 +145,11 @@ class Panel:
             files = presenter.prescription_files()
             self._pages.update(files)
             self._export.update(snapshot, files)
+
+    def downloads(self) -> Mapping[str, bytes] | None:
+        """The prescription's files while nothing blocks the export; else None."""
+        presenter = self._context.presenter
+        return presenter.prescription_files() if presenter.snapshot.can_export else None
 
     def close(self) -> None:
         """Stop what runs by itself."""
@@ -165,12 +171,13 @@ class Panel:
         from hexafix.presenter import Step
 
         presenter = self._context.presenter
-        plan, poses = presenter.value(Step.SCHEDULE), presenter.value(Step.POSES)
-        if plan is not self._drawn[0] or poses is not self._drawn[1]:
-            self._drawn = (plan, poses)
+        plan, pictures = presenter.value(Step.SCHEDULE), presenter.pictures()
+        if pictures != self._pictures:
+            self._pictures = pictures
             self._context.data.pictures = {
-                name: data_address(svg, "image/svg+xml")
-                for name, svg in presenter.pictures().items()
+                name: data_address(svg, "image/svg+xml") for name, svg in pictures.items()
             }
+        if plan is not self._plan:
+            self._plan = plan
             self._playback.take(snapshot, presenter.playback(), plan)
         self._playback.update(presenter.is_fresh(Step.SCHEDULE))

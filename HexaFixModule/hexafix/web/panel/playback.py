@@ -66,10 +66,10 @@ class Playback:
         name = self._name
         with html.Div(
             v_if=name.shown,
-            classes=(f"['hx-playback', {name.fresh} ? '' : 'hx-stale']",),
+            classes=(f"['hxp-playback', {name.fresh} ? '' : 'hxp-stale']",),
             **marked("playback", label="Playback of the correction", data_row=(name.row,)),
         ):
-            with html.Div(classes="hx-row hx-playback-bar"):
+            with html.Div(classes="hxp-row hxp-playback-bar"):
                 icon_button("mdi-skip-backward", "Today", "play-first", (self._go, "[0]"))
                 icon_button("mdi-chevron-left", "Adjustment before", "play-back", self._back)
                 icon_button(
@@ -88,31 +88,31 @@ class Playback:
                     density="compact",
                     hide_details=True,
                     color="primary",
-                    classes="hx-slider",
+                    classes="hxp-slider",
                     **marked("play-slider", label="Adjustment of the plan"),
                 )
                 html.Span(
                     f"{{{{ {name.when} }}}}",
-                    classes="hx-when",
+                    classes="hxp-when",
                     **marked("play-when", role="status"),
                 )
             with (
-                html.Div(classes="hx-cells"),
+                html.Div(classes="hxp-cells"),
                 html.Div(
                     v_for=f"(strut, i) in {name.struts}",
                     key="i",
-                    classes="hx-cell",
+                    classes="hxp-cell",
                     **marked(("'play-strut-' + (i + 1)",)),
                 ),
             ):
                 badge("i")
                 html.Span(
-                    "{{ strut.value }}", classes="hx-value", **marked(("'play-value-' + (i + 1)",))
+                    "{{ strut.value }}", classes="hxp-value", **marked(("'play-value-' + (i + 1)",))
                 )
-                html.Span("mm", classes="hx-unit")
+                html.Span("mm", classes="hxp-unit")
                 html.Span(
                     "{{ strut.arrow }} {{ strut.turn }} {{ strut.way }}",
-                    classes=("'hx-turn hx-' + strut.way",),
+                    classes="hxp-turn",
                     **marked(("'play-turn-' + (i + 1)",)),
                 )
 

@@ -38,7 +38,7 @@ class PosesStep:
         note("The answer is printed in the prescription.")
         table(context, "gates", "Safety gates")
         title("Marker layout")
-        with html.Div(classes="hx-grid-2"):
+        with html.Div(classes="hxp-grid-2"):
             for ring in ("proximal", "distal"):
                 picture(
                     f"{name.pictures}.layout_{ring}",

@@ -53,7 +53,7 @@ class PrescriptionPages:
             self._buttons("")
             with html.Button(
                 type="button",
-                classes="hx-page",
+                classes="hxp-page",
                 click=f"{name.large} = true",
                 **marked("enlarge-page", label="Show the page large"),
             ):
@@ -79,7 +79,7 @@ class PrescriptionPages:
         from trame.widgets import html
 
         name = self._name
-        with html.Div(classes="hx-row"):
+        with html.Div(classes="hxp-row"):
             icon_button(
                 "mdi-chevron-left",
                 "Page before",

@@ -41,8 +41,8 @@ class ReadingsStep:
         context, form = self._context, self._context.name.form
         note("The value on each strut's scale today, in mm.")
         with (
-            html.Div(classes="hx-readings", **marked("readings")),
-            html.Div(v_for=f"(reading, i) in {form}.readings", key="i", classes="hx-reading"),
+            html.Div(classes="hxp-readings", **marked("readings")),
+            html.Div(v_for=f"(reading, i) in {form}.readings", key="i", classes="hxp-reading"),
         ):
             badge("i")
             text_field(
@@ -66,7 +66,7 @@ class ReadingsStep:
                 suffix="mm",
                 v_if=f"{context.name.confirmed}.readings_needed",
             )
-        with html.Div(v_if=f"{context.name.confirmed}.readings_needed", classes="hx-note"):
+        with html.Div(v_if=f"{context.name.confirmed}.readings_needed", classes="hxp-note"):
             html.Span("Readings typed here are read from the frame a second time. ")
             html.B(
                 f"{{{{ {context.name.confirmed}.readings ? 'Both entries agree.'"

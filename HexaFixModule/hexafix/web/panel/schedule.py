@@ -40,7 +40,7 @@ class ScheduleStep:
         from trame.widgets import html
 
         context, form = self._context, f"{self._context.name.form}.schedule"
-        with html.Div(classes="hx-grid-2"):
+        with html.Div(classes="hxp-grid-2"):
             field(
                 context,
                 "schedule-start_date",
@@ -84,7 +84,7 @@ class ScheduleStep:
         self._curves()
         with html.Details(
             v_if=f"{context.name.table_strut_plan}.rows.length",
-            classes="hx-details",
+            classes="hxp-details",
             **marked("schedule-details"),
         ):
             html.Summary(

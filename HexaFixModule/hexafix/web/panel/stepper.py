@@ -27,16 +27,16 @@ class Stepper:
         from trame.widgets import html
 
         name = self._context.name
-        with html.Div(classes="hx-steps", **marked("steps", label="Steps of the workflow")):
+        with html.Div(classes="hxp-steps", **marked("steps", label="Steps of the workflow")):
             for index, (step, build) in enumerate(self._builders.items()):
                 view = f"({name.steps}[{index}] || {{}})"
                 opened = f"{name.current} === '{step}'"
                 with html.Section(
-                    classes=(f"['hx-step', {opened} ? 'hx-open' : '']",),
+                    classes=(f"['hxp-step', {opened} ? 'hxp-open' : '']",),
                     **marked(f"step-{step}", data_state=(f"{view}.state",)),
                 ):
                     self._head(step, index, view, opened)
-                    with html.Div(v_if=opened, classes="hx-body", **marked(f"body-{step}")):
+                    with html.Div(v_if=opened, classes="hxp-body", **marked(f"body-{step}")):
                         self._faults(view)
                         build()
 
@@ -46,22 +46,22 @@ class Stepper:
 
         with html.Button(
             type="button",
-            classes="hx-head",
+            classes="hxp-head",
             click=(self._go, f"['{step}']"),
             **marked(f"open-{step}", aria_expanded=(opened,)),
         ):
-            html.Span(str(index + 1), classes=(f"'hx-no hx-no-' + {view}.state",))
-            with html.Span(classes="hx-head-words"):
-                html.Span(f"{{{{ {view}.title }}}}", classes="hx-head-title")
+            html.Span(str(index + 1), classes=(f"'hxp-no hxp-no-' + {view}.state",))
+            with html.Span(classes="hxp-head-words"):
+                html.Span(f"{{{{ {view}.title }}}}", classes="hxp-head-title")
                 html.Span(
                     f"{{{{ {view}.summary }}}}",
                     v_if=f"{view}.summary !== {view}.word",
-                    classes="hx-summary",
+                    classes="hxp-summary",
                     title=(f"{view}.summary",),
                     **marked(f"summary-{step}"),
                 )
             with html.Span(
-                classes=(f"'hx-chip hx-chip-' + {view}.state",), **marked(f"state-{step}")
+                classes=(f"'hxp-chip hxp-chip-' + {view}.state",), **marked(f"state-{step}")
             ):
                 v.VIcon(icon=(f"{view}.icon",), size="x-small")
                 html.Span(f"{{{{ {view}.word }}}}")
@@ -71,7 +71,7 @@ class Stepper:
 
         with html.Ul(
             v_if=f"{view}.state === 'waiting' && ({view}.faults || []).length",
-            classes="hx-faults",
+            classes="hxp-faults",
             **marked("step-faults"),
         ):
             html.Li(f"{{{{ fault }}}}", v_for=f"(fault, i) in {view}.faults", key="i")  # noqa: F541

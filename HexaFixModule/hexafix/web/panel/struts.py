@@ -19,6 +19,6 @@ def badge(index: str) -> Any:
 
     return html.Span(
         f"{{{{ {index} + 1 }}}}",
-        classes=(f"'hx-badge hx-strut-' + ({index} + 1)",),
+        classes=(f"'hxp-badge hxp-strut-' + ({index} + 1)",),
         **marked((f"'badge-' + ({index} + 1)",)),
     )

@@ -40,12 +40,12 @@ class Toolbar:
         from trame.widgets import vuetify3 as v
 
         name = self._context.name
-        with html.Div(classes="hx-brand", **marked("brand")):
-            html.Span("HexaFix", classes="hx-logo")
-            with html.Span(classes="hx-case", **marked("case-id")):
+        with html.Div(classes="hxp-brand", **marked("brand")):
+            html.Span("HexaFix", classes="hxp-logo")
+            with html.Span(classes="hxp-case", **marked("case-id")):
                 html.Span(f"{{{{ {name.case_id} || 'no case' }}}}")
-                html.Span("not saved", v_if=name.edited, classes="hx-unsaved", **marked("unsaved"))
-        with html.Div(classes="hx-row", role="group"):
+                html.Span("not saved", v_if=name.edited, classes="hxp-unsaved", **marked("unsaved"))
+        with html.Div(classes="hxp-row", role="group"):
             icon_button("mdi-folder-open-outline", "Open a case", "open-case", self.open_case)
             save = f"{name.case_path} ? 'Save the case' : 'Save the case as a file'"
             icon_button("mdi-content-save-outline", (save,), "save-case", self.save)
@@ -61,7 +61,7 @@ class Toolbar:
         html.Span(
             f"{{{{ {name.undo_label} }}}}",
             v_if=name.can_undo,
-            classes="hx-undo-label",
+            classes="hxp-undo-label",
             **marked("undo-label"),
         )
         v.VSpacer()
@@ -74,15 +74,15 @@ class Toolbar:
             primary=True,
             v_if=f"!{name.busy}",
         )
-        html.Span(NOTICE, classes="hx-notice", **marked("notice", role="note"))
+        html.Span(NOTICE, classes="hxp-notice", **marked("notice", role="note"))
 
     def _progress(self) -> None:
         from trame.widgets import html
         from trame.widgets import vuetify3 as v
 
         name = self._context.name
-        with html.Div(v_if=name.busy, classes="hx-progress", **marked("progress", role="status")):
-            html.Span(f"{{{{ {name.progress_text} || 'working' }}}}", classes="hx-progress-text")
+        with html.Div(v_if=name.busy, classes="hxp-progress", **marked("progress", role="status")):
+            html.Span(f"{{{{ {name.progress_text} || 'working' }}}}", classes="hxp-progress-text")
             v.VProgressLinear(
                 model_value=(name.progress_percent,),
                 color="primary",

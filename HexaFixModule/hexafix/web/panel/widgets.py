@@ -181,17 +181,17 @@ def table(
     left = f"!{[*hidden]}.includes"
     words = getattr(context.name, f"table_{name}")
     if empty:
-        html.Div(empty, v_if=f"!{words}.rows.length", classes="hx-note", **marked(f"no-{name}"))
+        html.Div(empty, v_if=f"!{words}.rows.length", classes="hxp-note", **marked(f"no-{name}"))
     with (
-        html.Div(v_if=f"{words}.rows.length", classes="hx-scroll"),
+        html.Div(v_if=f"{words}.rows.length", classes="hxp-scroll"),
         html.Table(
-            classes=(f"['hx-table', {words}.stale ? 'hx-stale' : '']",),
+            classes=(f"['hxp-table', {words}.stale ? 'hxp-stale' : '']",),
             **marked(f"table-{name}", data_stale=(f"{words}.stale",)),
         ),
     ):
         with html.Caption():
             html.Span(caption)
-            html.Span(" · out of date", v_if=f"{words}.stale", classes="hx-late")
+            html.Span(" · out of date", v_if=f"{words}.stale", classes="hxp-late")
         with html.Thead(), html.Tr():
             with html.Template(v_for=f"column in {words}.columns", key="column"):
                 html.Th("{{ column }}", v_if=f"{left}(column)", scope="col")
@@ -212,8 +212,8 @@ def _rows(name: str, words: str, click: Any, picked: str, row_end: Any, left: st
     with html.Template(v_for=f"(row, i) in {words}.rows", key="i"):
         with html.Tr(
             classes=(
-                f"[{words}.alerts[i] ? 'hx-alert' : '', ({picked}) ? 'hx-picked' : '', "
-                f"'{'hx-click' if click else ''}']",
+                f"[{words}.alerts[i] ? 'hxp-alert' : '', ({picked}) ? 'hxp-picked' : '', "
+                f"'{'hxp-click' if click else ''}']",
             ),
             raw_attrs=raw,
             **acts,
@@ -222,15 +222,15 @@ def _rows(name: str, words: str, click: Any, picked: str, row_end: Any, left: st
                 html.Td(
                     "{{ cell }}",
                     v_if=f"{left}({words}.columns[j])",
-                    classes=("/[a-z]/.test(cell) ? '' : 'hx-figure'",),
+                    classes=("/^-?[0-9][^ ]*$/.test(cell) ? 'hxp-figure' : ''",),
                 )
             if row_end:
-                with html.Td(classes="hx-end"):
+                with html.Td(classes="hxp-end"):
                     row_end()
-        with html.Tr(v_if=f"{words}.alerts[i]", classes="hx-alert"):
+        with html.Tr(v_if=f"{words}.alerts[i]", classes="hxp-alert"):
             html.Td(
                 f"{{{{ {words}.alerts[i] }}}}",
-                classes="hx-why",
+                classes="hxp-why",
                 raw_attrs=[f':colspan="{words}.columns.length + {int(row_end is not None)}"'],
             )
 
@@ -239,14 +239,14 @@ def title(words: str) -> Any:
     """A small heading inside a step."""
     from trame.widgets import html
 
-    return html.H3(words, classes="hx-title")
+    return html.H3(words, classes="hxp-title")
 
 
 def note(words: Bound, **more: Any) -> Any:
     """A line of explanation in small grey letters."""
     from trame.widgets import html
 
-    return html.P(words, **{"classes": "hx-note", **more})
+    return html.P(words, **{"classes": "hxp-note", **more})
 
 
 def picture(expression: str, alternative: str, test_id: str, **more: Any) -> Any:
@@ -256,6 +256,6 @@ def picture(expression: str, alternative: str, test_id: str, **more: Any) -> Any
     return html.Img(
         v_if=expression,
         src=(expression,),
-        classes="hx-picture",
+        classes="hxp-picture",
         **{**marked(test_id, alt=alternative), **more},
     )
