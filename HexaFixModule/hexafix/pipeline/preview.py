@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from hexafix.case import Case
 from hexafix.correction import (
     Compensation,
+    FragmentMotion,
     RecognisedRings,
     compensate,
     motion_between,
@@ -39,13 +40,16 @@ def preview_target(case: Case, recognised: Recognised) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``moving``, ``fragment_lps`` (4×4, or None where the correction settles no motion),
-        ``target`` ({A} in {B}), ``struts_mm`` (scale values at the end, unrounded),
-        ``within_stroke`` (of each strut, at the end; the way there is checked by the plan) and
+        ``moving``; ``asked_lps``, the fragment's motion that the correction asks for (4×4, None
+        where it settles none; what a transform widget shows); ``fragment_lps``, the motion that
+        the frame makes of it from today's readings on, as the plan tells it (of a target pose
+        both are this);
+        ``target`` ({A} in {B}); ``struts_mm`` (scale values at the end, unrounded);
+        ``within_stroke`` (of each strut, at the end; the way there is checked by the plan);
         ``faults``.
     """
-    empty = {"moving": None, "fragment_lps": None, "target": None, "struts_mm": None}
-    empty |= {"within_stroke": None}
+    keys = ("moving", "asked_lps", "fragment_lps", "target", "struts_mm", "within_stroke")
+    empty = dict.fromkeys(keys)
     if case.correction is None:
         missing = Fault(
             "needed-for-a-plan",
@@ -61,6 +65,7 @@ def preview_target(case: Case, recognised: Recognised) -> dict[str, Any]:
         moving = case.correction.moving
         motion = motion_between(compensation, target=target, moving=moving)
         lengths = strut_lengths(target, case.fixator)
+        shown = pose_document(target)
     except HexaFixError as error:
         return {**empty, "faults": [fault.as_json() for fault in error.faults]}
     strut = case.fixator.strut
@@ -72,8 +77,11 @@ def preview_target(case: Case, recognised: Recognised) -> dict[str, Any]:
     ]
     return {
         "moving": moving,
+        "asked_lps": rounded(
+            (goal if isinstance(goal, FragmentMotion) else motion).motion.matrix, 12
+        ),
         "fragment_lps": rounded(motion.motion.matrix, 12),
-        "target": pose_document(target),
+        "target": shown,
         "struts_mm": rounded(lengths - strut.scale_offset_mm, 6),
         "within_stroke": inside,
         "faults": [fault.as_json() for fault in faults],
@@ -165,7 +173,8 @@ def motion_numbers(
     Raises
     ------
     InputError
-        If the matrix is not rigid.
+        If the matrix is not rigid, or its middle angle is ±90° (H35): then only the matrix tells
+        the motion.
     """
     center = _three("center_lps_mm", center_lps_mm)
     motion = Pose.from_matrix(matrix)
