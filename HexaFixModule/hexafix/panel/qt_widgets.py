@@ -164,7 +164,7 @@ class QtWidgets:
             widget.setCurrentIndex(index)
 
     def _chosen_row(self, widget: Any) -> int:
-        indexes = list(widget.selectionModel().selectedIndexes())
+        indexes = list(read(widget.selectionModel(), "selectedIndexes"))
         if indexes:
             return int(read(indexes[0], "row"))
         return -1
