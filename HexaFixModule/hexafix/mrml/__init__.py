@@ -7,7 +7,8 @@ loaded when first used.
 """
 
 from hexafix.mrml.app import HeadlessMrmlApp
+from hexafix.mrml.bundle import open_bundle, save_bundle
 from hexafix.mrml.logic import SceneLogic
 from hexafix.mrml.sync import SceneSync
 
-__all__ = ["HeadlessMrmlApp", "SceneLogic", "SceneSync"]
+__all__ = ["HeadlessMrmlApp", "SceneLogic", "SceneSync", "open_bundle", "save_bundle"]

@@ -7,16 +7,20 @@ the schedule moves two transforms and makes only the six struts anew.
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexafix import surfaces
+from hexafix.hardware.definition import fixator_from_document
 from hexafix.markers import BallSet
 from hexafix.mrml import markups, models
 from hexafix.mrml import transforms as places
-from hexafix.mrml.nodes import find, remove
+from hexafix.mrml.geometry import require_rigid
+from hexafix.mrml.nodes import PREFIX, find, remove
+from hexafix.mrml.parameter_node import stored_document
 from hexafix.report.scene import SceneGeometry
 from hexafix.report.words import STRUT_COLOURS
 
@@ -26,6 +30,9 @@ if TYPE_CHECKING:
 LETTERS = {"proximal": "A", "distal": "B"}
 
 STRUT_LABELS = "markups/frame/strut"
+
+IN_THE_CT = f"{PREFIX}in_the_ct_lps"
+"""Where the CT shows a ring, whatever row of the schedule is shown now: JSON, 4×4, LPS mm."""
 
 DISC_OPACITY, PLATE_OPACITY = 0.12, 0.9
 
@@ -39,6 +46,7 @@ def show_frame(scene: Any, geometry: SceneGeometry) -> None:
     for ring in ("proximal", "distal"):
         title = f"{ring.capitalize()} ring"
         pose = places.put_transform(scene, places.RING[ring], title, geometry.ring_pose(ring))
+        pose.SetAttribute(IN_THE_CT, json.dumps(geometry.ring_pose(ring).tolist()))
         for node in _ring_models(scene, still, ring, title):
             places.put_below(node, pose)
     show_struts(scene, geometry)
@@ -91,6 +99,25 @@ def _ring_models(scene: Any, still: SceneGeometry, ring: str, title: str) -> lis
         glyph=False,
     )
     return [plate, joints, disc, *axes, mark]
+
+
+def stored_geometry(scene: Any) -> SceneGeometry | None:
+    """The geometry that a scene was made of, without balls and bone; None if it shows none."""
+    nodes = {ring: find(scene, role) for ring, role in places.RING.items()}
+    document = stored_document(scene)
+    if document is None or not isinstance(document.get("fixator"), dict):
+        return None
+    poses = {}
+    for ring, node in nodes.items():
+        text = node.GetAttribute(IN_THE_CT) if node is not None else None
+        if text is None:
+            return None
+        poses[ring] = require_rigid(
+            np.array(json.loads(text), float).reshape(4, 4), what=f"pose of the {ring} ring"
+        )
+    fixator = fixator_from_document(document["fixator"])
+    side = document["limb"]["side"]
+    return SceneGeometry(poses["proximal"], poses["distal"], fixator, (), side)
 
 
 def show_struts(scene: Any, geometry: SceneGeometry) -> None:

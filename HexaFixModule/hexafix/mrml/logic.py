@@ -11,7 +11,16 @@ from hexafix.case import Case
 from hexafix.hardware import MarkerLayout
 from hexafix.imaging import Volume
 from hexafix.markers import BallSet
-from hexafix.mrml import fragments, frame, hierarchy, markups, models, parameter_node, tables
+from hexafix.mrml import (
+    bundle,
+    fragments,
+    frame,
+    hierarchy,
+    markups,
+    models,
+    parameter_node,
+    tables,
+)
 from hexafix.mrml import transforms as places
 from hexafix.mrml import volume as volumes
 from hexafix.mrml.geometry import lps_points, motion_of_vtk, require_rigid, vtk_of_motion
@@ -111,6 +120,15 @@ class SceneLogic:
     def select_ball(self, index: int | None) -> list[float] | None:
         """Mark a ball by a bigger glyph, and say where it is, LPS mm; None unmarks."""
         return markups.select(self.scene, index)
+
+    def save_bundle(self, path: Path) -> None:
+        """Save our nodes as a scene bundle (``.mrb``) that names nobody."""
+        bundle.save_bundle(self.scene, path)
+
+    def open_bundle(self, path: Path) -> None:
+        """Replace our nodes by those of a bundle; a refused one leaves the scene as it was."""
+        bundle.open_bundle(self.scene, path)
+        self._geometry = frame.stored_geometry(self.scene)
 
     def show_landmarks(
         self, moving: Sequence[Sequence[float]], fixed: Sequence[Sequence[float]]

@@ -18,6 +18,9 @@ ROLE = "HexaFix.role"
 PREFIX = "HexaFix."
 """All attributes of ours begin with it."""
 
+NAME = f"{PREFIX}name"
+"""The name we gave a node; the user may give it another one, which may name a patient."""
+
 
 @cache
 def slicer_core() -> Any:
@@ -62,8 +65,9 @@ def ensure(scene: Any, class_name: str, role: str, name: str) -> Any:
         node.SetName(name)
         node.SetAttribute(ROLE, role)
         scene.AddNode(node)
-    if node.GetName() != name:
+    if node.GetAttribute(NAME) != name:
         node.SetName(name)
+        node.SetAttribute(NAME, name)
     return node
 
 

@@ -83,6 +83,25 @@ def parameter_node(scene: Any) -> Any:
     return node
 
 
+PARAMETERS = frozenset(field.name for field in dataclasses.fields(ShellParameters))
+"""Names of all parameters."""
+
+
+def copy_parameters(source: Any, target: Any) -> None:
+    """Copy the values of a parameter node, the case without what may name somebody (H51)."""
+    shell = read(source, ShellParameters)
+    if shell.caseJson:
+        document = parse_json_object(shell.caseJson.encode(), what="case", where="caseJson")
+        bare = without_image(document)
+        if bare != document:
+            text = json.dumps(bare, allow_nan=False)
+            shell = dataclasses.replace(
+                shell, caseJson=text, caseJsonSha256=_sha256(text), caseFileSha256=_sha256(text)
+            )
+    shell.inputVolume = target.GetNodeReference("inputVolume")
+    write(target, shell)
+
+
 def write(node: Any, parameters: Any, prefix: str = "") -> None:
     """Write a dataclass instance into a parameter node."""
     state = node.StartModify()

@@ -19,7 +19,7 @@ from hexafix.imaging.file_geometry import FileGeometry, corners_mm, faults_of_gr
 from hexafix.imaging.fingerprint import fingerprint
 from hexafix.imaging.volume import Acquisition, ImageSource, Volume
 from hexafix.mrml.geometry import FLIP, array4, vtk4
-from hexafix.mrml.nodes import PREFIX, ROLE, slicer_core
+from hexafix.mrml.nodes import NAME, PREFIX, ROLE, slicer_core
 
 CONTENT = f"{PREFIX}content_sha256"
 AFFINE = f"{PREFIX}ijk_to_lps"
@@ -31,7 +31,7 @@ SAME_PLACE_MM = 1e-6
 WINDOW_HU, LEVEL_HU = 2500.0, 900.0
 """Shows soft tissue dark, bone grey and metal white."""
 
-VOLUME_ROLE = "volume"
+VOLUME_ROLE, NAME_OF_VOLUME = "volume", "CT"
 
 CHANGED = (
     "the volume was changed in the scene after it was read; what the reader checked and warned of "
@@ -43,7 +43,7 @@ FOREIGN = (
 )
 
 
-def add_volume(scene: Any, volume: Volume, name: str = "CT") -> Any:
+def add_volume(scene: Any, volume: Volume, name: str = NAME_OF_VOLUME) -> Any:
     """A new scalar volume node with the voxels of `volume`.
 
     Parameters
@@ -65,14 +65,25 @@ def add_volume(scene: Any, volume: Volume, name: str = "CT") -> Any:
     node = slicer_core().vtkMRMLScalarVolumeNode()
     node.SetName(name)
     node.SetAttribute(ROLE, VOLUME_ROLE)
+    node.SetAttribute(NAME, NAME_OF_VOLUME)
     node.SetIJKToRASMatrix(vtk4(FLIP @ volume.ijk_to_lps))
     node.SetAndObserveImageData(image)
     node.SetAttribute(AFFINE, json.dumps(volume.ijk_to_lps.tolist()))
     node.SetAttribute(SOURCE, json.dumps(_source_document(volume.source)))
     node.SetAttribute(CONTENT, fingerprint(volume.voxels, volume.ijk_to_lps))
     scene.AddNode(node)
-    node.CreateDefaultDisplayNodes()
+    _show_grey(scene, node)
     return node
+
+
+def _show_grey(scene: Any, node: Any) -> None:
+    """A display node of our own window: the default one counts all voxels first, for a second."""
+    display = slicer_core().vtkMRMLScalarVolumeDisplayNode()
+    display.AutoWindowLevelOff()
+    display.SetWindowLevel(WINDOW_HU, LEVEL_HU)
+    display.SetAndObserveColorNodeID("vtkMRMLColorTableNodeGrey")
+    scene.AddNode(display)
+    node.SetAndObserveDisplayNodeID(display.GetID())
 
 
 def set_window(node: Any, *, window_hu: float, level_hu: float) -> None:
