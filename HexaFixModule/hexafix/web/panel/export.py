@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.export import MANIFEST
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext
 from hexafix.web.panel.prescription import PrescriptionPages
@@ -121,7 +122,8 @@ class ExportStep:
 
     def update(self, snapshot: Snapshot, files: Mapping[str, bytes] | None) -> None:
         """List the files of the fresh prescription."""
-        self._data.files = [{"name": name, "words": FILES.get(name, "")} for name in files or ()]
+        names = (*files, MANIFEST) if files else ()
+        self._data.files = [{"name": name, "words": FILES.get(name, "")} for name in names]
 
     def _confirm(self, side: str) -> None:
         self._context.act(lambda: self._context.presenter.confirm_side(side))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.export import MANIFEST, manifest
 from hexafix.web.panel.banner import Banners
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext
@@ -147,9 +148,10 @@ class Panel:
             self._export.update(snapshot, files)
 
     def downloads(self) -> Mapping[str, bytes] | None:
-        """The prescription's files while nothing blocks the export; else None."""
+        """An export's files while nothing blocks the export; else None."""
         presenter = self._context.presenter
-        return presenter.prescription_files() if presenter.snapshot.can_export else None
+        files = presenter.prescription_files() if presenter.snapshot.can_export else None
+        return None if files is None else {**files, MANIFEST: manifest(files)}
 
     def close(self) -> None:
         """Stop what runs by itself."""

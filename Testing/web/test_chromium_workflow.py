@@ -1,0 +1,294 @@
+"""The whole workflow in a real Chromium: swap, refusal, undo, plan, playback, print, download."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "HexaFixModule"
+FILES = ("prescription.pdf", "schedule.csv", "plan.json", "markers.mrk.json", "manifest.json")
+LONG_MS = 60_000
+
+
+class Desk:
+    """A page with a workstation, spoken to by the names of its parts."""
+
+    def __init__(self, page, case):
+        self.page, self.case = page, case
+
+    def at(self, name):
+        return self.page.locator(f'[data-testid="{name}"]')
+
+    def click(self, name):
+        self.at(name).click()
+
+    def open(self, step):
+        if not self.at(f"body-{step}").is_visible():
+            self.click(f"open-{step}")
+        self.at(f"body-{step}").wait_for()
+
+    def wait(self, step, state):
+        """Wait until a step is in a state."""
+        found = f'[data-testid="step-{step}"][data-state="{state}"]'
+        self.page.wait_for_selector(found, timeout=LONG_MS)
+
+    def wait_for(self, selector):
+        self.page.wait_for_selector(selector, timeout=LONG_MS)
+
+    def write(self, field, text):
+        """Write into a field and leave it."""
+        entry = self.at(field).locator("input")
+        entry.fill(text)
+        entry.press("Tab")
+
+    def ball_of(self, number):
+        return self.at(f"number-{number}").get_attribute("data-ball")
+
+
+@pytest.fixture(scope="module")
+def a_desk(start_serving, a_case_on_disk, a_chromium, tmp_path_factory):
+    """A workstation of its own with the phantom's case open, in a page of 1440 × 900."""
+    folder = tmp_path_factory.mktemp("desk") / "phantom"
+    shutil.copytree(a_case_on_disk.parent, folder)
+    process, url = start_serving(folder / "case.json")
+    context = a_chromium.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
+    page = context.new_page()
+    page.said, page.asked = [], []
+    page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: page.said.append(str(error)))
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.goto(url)
+    desk = Desk(page, folder / "case.json")
+    desk.wait("load", "done")
+    yield desk
+    context.close()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def a_planned_desk(a_desk):
+    """The same, with the prescription made and the side of the limb given a second time."""
+    a_desk.click("run-all")
+    a_desk.wait("export", "done")
+    a_desk.open("export")
+    a_desk.click("confirm-left")
+    a_desk.at("files").wait_for()
+    return a_desk
+
+
+@pytest.fixture(scope="module")
+def an_export_by_command(a_desk, tmp_path_factory):
+    """What `hexafix plan` writes for the same case file."""
+    folder = tmp_path_factory.mktemp("command") / "prescription"
+    subprocess.run(
+        [sys.executable, "-m", "hexafix", "plan", a_desk.case, "--out", folder],
+        check=True,
+        capture_output=True,
+        env={**os.environ, "PYTHONPATH": str(PACKAGE), "OPENBLAS_NUM_THREADS": "1"},
+    )
+    return folder
+
+
+def test_two_numbers_swapped_by_click_are_refused_until_undone(a_desk):
+    a_desk.open("markers")
+    a_desk.click("run-markers")
+    a_desk.wait("numbering", "done")
+    a_desk.open("numbering")
+    first, second = a_desk.ball_of(1), a_desk.ball_of(2)
+    a_desk.click("number-1")
+    a_desk.wait_for('[data-testid="number-1"][aria-pressed="true"]')
+    a_desk.click("number-2")
+    a_desk.wait("numbering", "refused")
+    assert (a_desk.ball_of(1), a_desk.ball_of(2)) == (second, first)
+    banner = a_desk.at("banner").filter(has=a_desk.at("banner-next-step"))
+    assert banner.first.get_attribute("data-kind") == "refused"
+    assert "do not fit" in banner.first.inner_text()
+    assert "exchanged" in a_desk.at("banner-next-step").first.inner_text()
+    assert a_desk.at("undo-label").inner_text() == "swap numbers 1 and 2"
+    a_desk.page.keyboard.press("Control+z")
+    a_desk.wait("numbering", "done")
+    assert (a_desk.ball_of(1), a_desk.ball_of(2)) == (first, second)
+    assert a_desk.at("banner").count() == 0
+
+
+def test_a_number_is_given_to_a_ball_by_two_clicks(a_desk):
+    a_desk.open("numbering")
+    was, other = a_desk.ball_of(3), a_desk.ball_of(7)
+    a_desk.click("number-3")
+    a_desk.wait_for('[data-testid="number-3"][aria-pressed="true"]')
+    a_desk.click(f"ball-chip-{int(other.removeprefix('ball ')) - 1}")
+    a_desk.wait_for(f'[data-testid="number-3"][data-ball="{other}"]')
+    a_desk.wait("numbering", "refused")
+    a_desk.click("undo")
+    a_desk.wait_for(f'[data-testid="number-3"][data-ball="{was}"]')
+
+
+def test_the_downloads_are_the_bytes_that_the_command_line_writes(
+    a_planned_desk, an_export_by_command, tmp_path
+):
+    a_planned_desk.open("export")
+    for name in FILES:
+        with a_planned_desk.page.expect_download() as download:
+            a_planned_desk.click(f"download-{name}")
+        download.value.save_as(tmp_path / name)
+    written = {path.name: path.read_bytes() for path in an_export_by_command.iterdir()}
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == written
+    assert set(written) == set(FILES)
+
+
+def test_the_exported_folder_is_the_one_that_the_command_line_writes(
+    a_planned_desk, an_export_by_command, tmp_path
+):
+    folder = tmp_path / "export"
+    a_planned_desk.open("export")
+    a_planned_desk.click("export-folder")
+    a_planned_desk.at("chooser-path").locator("input").fill(str(folder))
+    a_planned_desk.click("chooser-accept")
+    a_planned_desk.at("exported-to").wait_for()
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
+        path.name: path.read_bytes() for path in an_export_by_command.iterdir()
+    }
+
+
+def test_the_playback_shows_the_rows_of_the_schedule(a_planned_desk, an_export_by_command):
+    with (an_export_by_command / "schedule.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    a_planned_desk.click("play-first")
+    before = None
+    for index in range(6):
+        a_planned_desk.wait_for(f'[data-testid="playback"][data-row="{index}"]')
+        row = rows[index]
+        shown = [a_planned_desk.at(f"play-value-{k}").inner_text() for k in range(1, 7)]
+        assert shown == [row[f"strut_{k}_mm"] for k in range(1, 7)]
+        assert row["date"] in a_planned_desk.at("play-when").inner_text()
+        for k in range(1, 7):
+            turn = a_planned_desk.at(f"play-turn-{k}").inner_text()
+            change = float(row[f"strut_{k}_mm"]) - float((before or row)[f"strut_{k}_mm"])
+            words = {True: "longer", False: "shorter"}[change > 0] if change else "no turn"
+            assert words in turn
+            assert not change or f"{abs(change):.1f}" in turn
+        before = row
+        a_planned_desk.click("play-next")
+
+
+def test_the_prescription_is_shown_page_by_page(a_planned_desk):
+    a_planned_desk.open("export")
+    image = a_planned_desk.at("page-image")
+    first = image.get_attribute("src")
+    assert first.startswith("data:image/png")
+    a_planned_desk.click("page-next")
+    a_planned_desk.page.wait_for_function(
+        "first => document.querySelector('[data-testid=page-image]').src !== first", arg=first
+    )
+    assert "Page 2 of" in a_planned_desk.at("page-words").inner_text()
+
+
+def test_an_edit_greys_the_results_and_blocks_the_export_until_undone(a_planned_desk):
+    a_planned_desk.open("schedule")
+    a_planned_desk.write("schedule-max_rate_mm_per_day", "0.5")
+    a_planned_desk.wait("schedule", "stale")
+    a_planned_desk.wait_for('[data-testid="table-schedule"][data-stale="true"]')
+    a_planned_desk.open("export")
+    assert a_planned_desk.at("files").count() == 0
+    assert "Schedule" in a_planned_desk.at("export-blocked").inner_text()
+    assert a_planned_desk.at("export-folder").is_disabled()
+    answer = a_planned_desk.page.request.get(export_url(a_planned_desk, "plan.json"))
+    assert answer.status == 404
+    a_planned_desk.click("undo")
+    a_planned_desk.wait("export", "done")
+    a_planned_desk.at("files").wait_for()
+    assert a_planned_desk.page.request.get(export_url(a_planned_desk, "plan.json")).ok
+
+
+def export_url(desk, name):
+    return desk.page.url.partition("/index.html")[0] + f"/export/{name}"
+
+
+def test_the_other_side_is_refused_and_blocks_the_export(a_planned_desk):
+    a_planned_desk.open("export")
+    a_planned_desk.click("confirm-right")
+    a_planned_desk.at("side-not-confirmed").wait_for()
+    assert "side" in a_planned_desk.at("banner-message").first.inner_text()
+    assert a_planned_desk.page.request.get(export_url(a_planned_desk, "plan.json")).status == 404
+    a_planned_desk.click("confirm-left")
+    a_planned_desk.at("side-confirmed").wait_for()
+
+
+def test_a_decimal_comma_is_not_taken_and_says_so_at_its_field(a_planned_desk):
+    a_planned_desk.open("readings")
+    entry = a_planned_desk.at("reading-2").locator("input")
+    value = entry.input_value()
+    a_planned_desk.write("reading-2", "175,5")
+    field = a_planned_desk.at("reading-2")
+    field.get_by_text("not taken").wait_for()
+    assert a_planned_desk.at("step-export").get_attribute("data-state") == "done"
+    a_planned_desk.write("reading-2", value)
+    field.get_by_text("not taken").wait_for(state="detached")
+
+
+def test_a_typed_reading_is_asked_for_a_second_time(a_planned_desk):
+    a_planned_desk.open("readings")
+    given = [a_planned_desk.at(f"reading-{k}").locator("input").input_value() for k in range(1, 7)]
+    a_planned_desk.write("reading-1", f"{float(given[0]) + 0.5:g}")
+    a_planned_desk.wait_for('[data-testid="readings-agree"][data-agree="false"]')
+    for k in range(1, 7):
+        a_planned_desk.write(f"again-{k}", given[k - 1])
+    a_planned_desk.at("banner").filter(has_text="strut 1").wait_for()
+    a_planned_desk.write("again-1", f"{float(given[0]) + 0.5:g}")
+    a_planned_desk.wait_for('[data-testid="readings-agree"][data-agree="true"]')
+    a_planned_desk.click("undo")
+    a_planned_desk.wait("export", "done")
+
+
+def test_a_reload_of_the_page_keeps_everything(a_planned_desk):
+    a_planned_desk.open("poses")
+    a_planned_desk.page.reload()
+    a_planned_desk.at("body-poses").wait_for()
+    a_planned_desk.wait("export", "done")
+    assert a_planned_desk.at("case-id").inner_text().startswith(case_id(a_planned_desk))
+    assert a_planned_desk.at("playback").is_visible()
+
+
+def case_id(desk):
+    return json.loads(desk.case.read_text())["case_id"]
+
+
+def test_that_it_is_no_medical_device_is_always_on_screen(a_planned_desk):
+    for step in ("load", "correction", "export"):
+        a_planned_desk.open(step)
+        words = a_planned_desk.at("notice").inner_text()
+        assert a_planned_desk.at("notice").is_visible()
+        assert "Not a medical device" in words
+        assert "not approved" in words
+
+
+UNNAMED = """() => [...document.querySelectorAll('button, input, [role=button], a, select, img')]
+  .filter(e => e.offsetParent !== null && e.type !== 'hidden')
+  .filter(e => !(e.innerText || '').trim() && !e.getAttribute('aria-label')
+    && !e.getAttribute('alt') && !e.getAttribute('title') && !e.closest('[aria-label]')
+    && !(e.labels && e.labels.length))
+  .map(e => e.outerHTML.slice(0, 200))"""
+"""Controls that a screen reader could not name."""
+
+
+def test_every_control_has_a_name(a_planned_desk):
+    for step in ("load", "markers", "numbering", "poses", "readings", "correction", "export"):
+        a_planned_desk.open(step)
+        assert a_planned_desk.page.evaluate(UNNAMED) == []
+
+
+def test_nothing_was_asked_elsewhere_and_the_console_is_clean(a_planned_desk):
+    here = a_planned_desk.page.url.partition("/index.html")[0]
+    elsewhere = [
+        url for url in a_planned_desk.page.asked if not url.startswith((here, "data:", "blob:"))
+    ]
+    assert elsewhere == []
+    unwanted = [words for words in a_planned_desk.page.said if "404" not in words]
+    assert unwanted == []
