@@ -19,6 +19,7 @@ from hexafix.cli.console import (
     quiet_libraries,
     report_error,
 )
+from hexafix.cli.desktop import desktop
 from hexafix.cli.execution_model import XML, Channel, execution_model_xml
 from hexafix.cli.serve import serve
 from hexafix.cli.study import study
@@ -44,6 +45,7 @@ app = App(
 app.command(study)
 app.command(advise)
 app.command(serve)
+app.command(desktop)
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document.")]
 Quiet = Annotated[bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress.")]

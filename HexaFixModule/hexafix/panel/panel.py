@@ -289,8 +289,17 @@ class Panel:
 
     def drag(self, on: bool) -> None:
         """Let the bone be dragged in the 3D view, or end that."""
+        if on:
+            correction.moving(self)
         self.dragging = on
         self.dragging_changed.emit(on)
+
+    def moving_fragment(self) -> str:
+        """The fragment that moves: the open form's, or an empty text."""
+        try:
+            return correction.moving(self)
+        except (InputError, KeyError):
+            return ""
 
     def dragged(self, matrix_lps: Sequence[Sequence[float]]) -> None:
         """The bone was dragged to this motion, 4×4, LPS mm."""

@@ -28,6 +28,9 @@ SIGNALS = {
 ALERT = "⚠ "
 """Before the first cell of a row that needs attention."""
 
+BANNER_HEIGHT = 150
+"""Messages higher than this, in pixels, are scrolled."""
+
 ISO = "yyyy-MM-dd"
 
 
@@ -200,6 +203,11 @@ class QtWidgets:
 
     def _set_html(self, widget: Any, html: str) -> None:
         widget.setHtml(html)
+        # As high as the messages, up to the height that the .ui allows.
+        document = read(widget, "document")
+        document.setTextWidth(max(200, int(read(widget, "width")) - 24))
+        wanted = int(read(document, "size").height()) + 8
+        widget.setFixedHeight(max(40, min(wanted, BANNER_HEIGHT)))
 
     def _set_date(self, widget: Any, iso: str) -> None:
         widget.setDate(self.kit.QDate.fromString(iso, ISO))

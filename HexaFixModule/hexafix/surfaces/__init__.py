@@ -19,6 +19,7 @@ from hexafix.surfaces.frame import (
     joint_spheres,
     ring_plate,
     spheres,
+    strut_middles_mm,
     strut_tubes,
 )
 from hexafix.surfaces.slices import (
@@ -71,5 +72,6 @@ __all__ = [
     "slice_places_mm",
     "spheres",
     "strut_colour",
+    "strut_middles_mm",
     "strut_tubes",
 ]

@@ -70,6 +70,12 @@ def strut_tubes(scene: SceneGeometry) -> tuple[Any, ...]:
     return tuple(struts)
 
 
+def strut_middles_mm(scene: SceneGeometry) -> tuple[tuple[float, float, float], ...]:
+    """The middles of struts 1 to 6 in LPS, mm: where their numbers are written."""
+    middles = 0.5 * (scene.joints_mm("proximal") + scene.joints_mm("distal"))
+    return tuple((float(x), float(y), float(z)) for x, y, z in middles)
+
+
 def joint_spheres(scene: SceneGeometry, ring: str) -> Any:
     """The six joints of ring ``proximal`` or ``distal`` as one vtkPolyData."""
     return spheres(scene.joints_mm(ring), diameters_mm=2 * JOINT_RADIUS_MM)

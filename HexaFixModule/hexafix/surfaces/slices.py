@@ -62,10 +62,10 @@ AXIAL = SliceView(
     "axial", "Axial", 2, (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), *("L", "R", "A", "P", "S")
 )
 CORONAL = SliceView(
-    "coronal", "Coronal", 1, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), *("L", "R", "S", "I", "P")
+    "coronal", "Coronal", 1, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), *("L", "R", "H", "F", "P")
 )
 SAGITTAL = SliceView(
-    "sagittal", "Sagittal", 0, (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), *("P", "A", "S", "I", "L")
+    "sagittal", "Sagittal", 0, (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), *("P", "A", "H", "F", "L")
 )
 SLICE_VIEWS = (AXIAL, CORONAL, SAGITTAL)
 
