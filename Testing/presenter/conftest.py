@@ -1,13 +1,17 @@
-"""A fake pipeline: quick, counted, as slow or refusing as a test asks for."""
+"""A fake pipeline: quick, counted, as slow or refusing as a test asks for.
+
+Each value is a digest of what it was made from, and each function reads from a case what the real
+one reads, so that a value of older inputs, or of too few, shows.
+"""
 
 import copy
 import hashlib
 import json
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-
 from hexafix.errors import Refused
 from hexafix.progress import silent
 
@@ -21,19 +25,34 @@ def digest(*values):
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()
 
 
+def numbers_of(case):
+    return None if case.numbering is None else {n: list(p) for n, p in case.numbering.items()}
+
+
+def sites_of(case):
+    rings = (case.proximal, case.distal)
+    return [(s.number, s.radius_mm, round(s.sweep_rad, 9)) for r in rings for s in r.sites]
+
+
+def struts_of(case):
+    if case.strut_readings_mm is None or case.fixator is None:
+        return None
+    return [list(case.strut_readings_mm), case.fixator.id]
+
+
 class FakeEngine:
-    """Every value is a digest of what it was made from, so that a stale one shows."""
+    """The pipeline's functions; `hold` keeps one under way, `fail` makes one raise."""
 
     def __init__(self):
         self.calls = []
-        self.refuse = set()
+        self.fail = {}
         self.hold = {}
         self.entered = threading.Event()
 
     def _made(self, name, *values):
         self.calls.append(name)
-        if name in self.refuse:
-            raise Refused.of(f"{name}-refused", f"{name} refuses", hazard="H12", next_step="look")
+        if name in self.fail:
+            raise self.fail[name]
         return digest(name, *values)
 
     def _long(self, name, progress):
@@ -45,18 +64,23 @@ class FakeEngine:
         progress(name, 1.0)
 
     def image_series(self, path, *, progress=silent):
-        return {"series": [], "patients": 1, "skipped": []}
+        self._long("image_series", progress)
+        series = {
+            "number": 1, "description": "axial", "modality": "CT", "slices": 40,
+            "size_ij": [512, 512], "series_instance_uid": "1.2.3", "left_out": None,
+            "refused": [],
+        }  # fmt: skip
+        return {"series": [series], "patients": 1, "skipped": []}
 
     def read_image(self, path, *, series_instance_uid=None, progress=silent):
         self._long("read_image", progress)
-        content = path.read_bytes()
-        made = self._made("read_image", content.decode(), series_instance_uid)
-        return SimpleNamespace(made=made)
+        content = Path(path).read_text()
+        return SimpleNamespace(made=self._made("read_image", content, series_instance_uid))
 
     def image_document(self, volume):
         return {
             "kind": "nrrd", "size_ijk": [4, 4, 4], "spacing_mm": [1.0, 1.0, 1.0],
-            "sha256": volume.made, "warnings": [],
+            "gantry_tilt_deg": None, "sha256": volume.made, "warnings": [],
         }  # fmt: skip
 
     def find_case_balls(
@@ -72,15 +96,9 @@ class FakeEngine:
         if found is None:
             self._long("find_case_balls", progress)
             self.calls.append("search")
-        self._made("edit_balls")
-        made = digest("balls", volume.made, ball_diameter_mm, added_lps_mm, removed_lps_mm)
+        edits = list(added_lps_mm), list(removed_lps_mm)
+        made = self._made("find_case_balls", volume.made, ball_diameter_mm, edits)
         return SimpleNamespace(made=made)
-
-    def with_ball_added(self, edits, *, lps_mm):
-        return {**edits, "added_lps_mm": [*edits["added_lps_mm"], lps_mm]}
-
-    def with_ball_removed(self, edits, *, ball):
-        return {**edits, "removed_lps_mm": [*edits["removed_lps_mm"], ball["center_mm"]]}
 
     def balls_document(self, balls):
         ball = {
@@ -90,28 +108,45 @@ class FakeEngine:
         centers = [[float(k), 2.0 * k, 3.0 * k] for k in range(8)]
         return {
             "balls": [{"center_mm": center, **ball} for center in centers],
-            "rejected": [], "warnings": [],
+            "rejected": [{"center_mm": [1.0, 2.0, 3.0], "reason": "radius"}], "warnings": [],
         }  # fmt: skip
 
-    def judge_case_numbering(self, parts, balls):
-        assigned = parts.numbering
+    def with_ball_added(self, edits, *, lps_mm):
+        return {**edits, "added_lps_mm": [*edits["added_lps_mm"], lps_mm]}
+
+    def with_ball_removed(self, edits, *, ball):
+        return {**edits, "removed_lps_mm": [*edits["removed_lps_mm"], ball["center_mm"]]}
+
+    def _settled(self, case):
+        """A radius of 99 mm stands for layouts that leave the numbering a choice."""
+        if case.numbering is not None:
+            return numbers_of(case)
+        return struts_of(case) if case.proximal.sites[0].radius_mm == 99.0 else "layout"
+
+    def judge_case_numbering(self, case, balls):
+        settled = self._settled(case)
         found = {str(k + 1): k for k in range(8)}
-        if assigned is not None:
-            found = {str(n): round(float(p[0])) for n, p in assigned.items()}
-        lengths = parts.strut_readings_mm
-        made = self._made("judge", balls.made, found, None if lengths is None else list(lengths))
-        ring = {"residuals_mm": dict.fromkeys(found, 0.01), "rms_mm": 0.01}
+        if case.numbering is not None:
+            found = {str(n): round(float(p[0])) for n, p in case.numbering.items()}
+        faults = []
+        if settled is None:
+            faults = [{"code": "numbering-ambiguous", "message": "no choice", "hazard": "H18"}]
+        residuals = dict.fromkeys(found, 0.01)
         return {
-            "made": made, "complete": len(found) == 8, "assigned": found,
-            "rings": {"proximal": ring, "distal": {"residuals_mm": {}}}, "faults": [],
+            "made": self._made("judge", balls.made, sites_of(case), settled),
+            "complete": len(found) == 8 and not faults, "assigned": found, "faults": faults,
+            "rings": {"proximal": {"residuals_mm": residuals}, "distal": {"residuals_mm": {}}},
         }  # fmt: skip
 
     def recognise_checked(
         self, case, *, volume=None, balls=None, accept_relaxed_layout=False, progress=silent
     ):
         self._long("recognise", progress)
-        case_made = digest(dict(case.document), accept_relaxed_layout)
-        made = self._made("recognise", volume.made, balls.made, case_made)
+        read = [case.limb.side, case.limb.bone, sites_of(case), self._settled(case)]
+        read += [case.ball_diameter_mm, accept_relaxed_layout]
+        made = self._made("recognise", volume.made, balls.made, read)
+        if case.limb.bone == "humerus":
+            raise Refused.of("limb-conflict", "not the limb of the image", hazard="H37")
         return SimpleNamespace(made=made)
 
     def recognition_document(self, case, recognised):
@@ -129,15 +164,28 @@ class FakeEngine:
         return {"proximal": ring, "distal": ring, "advice": []}
 
     def weigh_document(self, case, recognised):
-        made = self._made("weigh", recognised.made, dict(case.document))
-        return {"made": made, "struts": [], "faults": []}
+        made = self._made("weigh", recognised.made, struts_of(case))
+        struts = [
+            {
+                "strut": k + 1, "reading_mm": float(reading), "length_mm": float(reading),
+                "ct_length_mm": 180.0, "difference_mm": 0.1, "verdict": "agrees",
+            }
+            for k, reading in enumerate(case.strut_readings_mm)
+        ]  # fmt: skip
+        return {"made": made, "struts": struts, "faults": []}
 
     def preview_target(self, case, recognised):
-        return {"made": self._made("preview", recognised.made, dict(case.document)), "faults": []}
+        rules = case.schedule and [case.schedule.compensation, case.schedule.strut_step_mm]
+        read = [dict(case.document)["correction"], case.limb.side, struts_of(case), rules]
+        return {
+            "made": self._made("preview", recognised.made, read), "faults": [],
+            "target": {"position_mm": [0.0, 0.0, 160.0], "angles_deg": [0.0] * 3},
+            "struts_mm": [180.0] * 6, "within_stroke": [True] * 6,
+        }  # fmt: skip
 
     def plan_recognised(self, case, recognised, *, accept_relaxed_layout=False):
-        made = self._made("plan", recognised.made, case.case_sha256, accept_relaxed_layout)
-        return SimpleNamespace(made=made, case=case)
+        read = [case.case_sha256, case.fixator_sha256, accept_relaxed_layout]
+        return SimpleNamespace(made=self._made("plan", recognised.made, read))
 
     def plan_document_of(self, plan):
         row = {"day": 0, "date": "2026-12-01", "adjustment": 0, "strut_mm": [180.0] * 6}
@@ -154,19 +202,21 @@ class FakeEngine:
     def prescribe(self, plan, *, progress=silent):
         self._long("prescribe", progress)
         made = self._made("prescribe", plan.made)
-        files = {"plan.json": made.encode()}
-        return SimpleNamespace(made=made, document={"made": made, "gates": [GATE]}, files=files)
+        document = {"made": made, "gates": [GATE]}
+        return SimpleNamespace(made=made, document=document, files={"plan.json": made.encode()})
 
     def write_prescription(self, prescription, folder):
+        self._made("write")
         folder.mkdir()
         for name, content in prescription.files.items():
             (folder / name).write_bytes(content)
 
     def playback(self, plan):
+        self.calls.append("playback")
         return SimpleNamespace(rows=(), made=plan.made)
 
     def pictures(self, document):
-        return {"strut_curves": "<svg/>"}
+        return {"strut_curves": document["made"]}
 
     def layout_pictures(self, proximal, distal):
         return {"layout_proximal": "<svg/>"}
@@ -208,6 +258,11 @@ def an_engine():
 
 
 @pytest.fixture
+def a_fake_engine_class():
+    return FakeEngine
+
+
+@pytest.fixture
 def a_case_file(tmp_path, a_case):
     """A complete case on disk; its image is a text."""
     (tmp_path / "ct.txt").write_text("one image")
@@ -238,3 +293,32 @@ def a_presenter(make_presenter, an_engine, a_case_file):
     presenter = make_presenter(engine=an_engine, threaded=False)
     assert presenter.open_case(a_case_file)
     return presenter
+
+
+@pytest.fixture
+def a_planned(a_presenter):
+    """With everything computed and the side said twice."""
+    a_presenter.run_all()
+    a_presenter.confirm_side("left")
+    assert a_presenter.snapshot.can_export, a_presenter.snapshot.export_blocked_by
+    return a_presenter
+
+
+@pytest.fixture
+def states():
+    """The states of all steps, by name."""
+
+    def of(presenter):
+        return {view.step.value: view.state.value for view in presenter.snapshot.steps}
+
+    return of
+
+
+@pytest.fixture
+def codes():
+    """The codes of all banners."""
+
+    def of(presenter):
+        return [banner.code for banner in presenter.snapshot.banners]
+
+    return of

@@ -13,7 +13,7 @@ from hexafix.presenter import notices, view
 from hexafix.presenter.compute import compute, faults_of_error, kind_of
 from hexafix.presenter.engine import Engine, pipeline_engine
 from hexafix.presenter.history import History, Version, document_bytes
-from hexafix.presenter.inputs import ORDER, Inputs, stamp_of
+from hexafix.presenter.inputs import ORDER, Inputs, file_hash, stamp_of
 from hexafix.presenter.results import Result, Results
 from hexafix.presenter.signal import Signal
 from hexafix.presenter.state import Banner, Kind, Snapshot, Step, Table
@@ -22,14 +22,15 @@ from hexafix.presenter.worker import Job, Post
 NEW_CASE: Mapping[str, Any] = {"schema_version": 2, "ring_front_confirmed": False}
 """What a new case holds: nothing is guessed, and the rings' front is asked for (H22)."""
 
-LIVE = {
-    Step.MARKERS: Step.LOAD,
-    Step.NUMBERING: Step.MARKERS,
-    Step.READINGS: Step.POSES,
-    Step.CORRECTION: Step.POSES,
-}
-"""Steps that take milliseconds and follow every edit at once, with the step they need; the balls
-only after one search for them."""
+LIVE = (
+    (Step.MARKERS, Step.LOAD),
+    (Step.NUMBERING, Step.MARKERS),
+    (Step.NUMBERING, Step.MARKERS),
+    (Step.READINGS, Step.POSES),
+    (Step.CORRECTION, Step.POSES),
+)
+"""Steps that take milliseconds and follow every edit at once, with the step they need: the balls
+after one search for them, the numbering by the layouts alone and then, if need be, by readings."""
 
 P = ParamSpec("P")
 Self = TypeVar("Self", bound="Core")
@@ -202,24 +203,42 @@ class Core:
         """Look at the files of image and fixator anew: another program may have changed them."""
         self.stamps.clear()
         self.inputs = self._present_inputs()
+        self.update_inputs()
 
     def new_version(self) -> None:
         """The present version has changed: work on what is past is stopped."""
         before, self.inputs = self.inputs, self._present_inputs()
+        self.update_inputs()
         step, job = self.running, self.job
         if job is None or step is None:
             return
         if before.fingerprint(step) != self.inputs.fingerprint(step):
             job.skip()
 
+    def update_inputs(self) -> None:
+        """Let `inputs` say whether the readings settle the numbering."""
+        inputs = self.inputs
+        if inputs.readings_asked or not inputs.readings_could_settle:
+            return
+        by_layout = self.results.of(Step.NUMBERING, inputs.key(Step.NUMBERING, self.image))
+        if by_layout is not None and not by_layout.done:
+            self.inputs = inputs.changed(readings_asked=True)
+
     def _present_inputs(self) -> Inputs:
+        """The present version with the files that it names."""
         inputs = Inputs(self.history.present)
-        if inputs.faults_before(Step.LOAD):
-            return inputs
-        path = inputs.image_path
+        stamp = ""
+        if not inputs.faults_before(Step.LOAD):
+            stamp = self._looked_at(inputs.image_path, stamp_of)
+        fixator = self._looked_at(inputs.fixator_path, file_hash)
+        return inputs.changed(stamp=stamp, fixator_file=fixator)
+
+    def _looked_at(self, path: Path | None, look: Callable[[Path], str]) -> str:
+        if path is None:
+            return ""
         if path not in self.stamps:
-            self.stamps[path] = stamp_of(path)
-        return Inputs(self.history.present, self.stamps[path])
+            self.stamps[path] = look(path)
+        return self.stamps[path]
 
     def refresh(self) -> None:
         """Bring live steps up to date and hand out a new snapshot."""
@@ -235,7 +254,8 @@ class Core:
 
     def _live(self) -> None:
         self._live_layout()
-        for step, before in LIVE.items():
+        for step, before in LIVE:
+            self.update_inputs()
             source, key, image = self.result(before), self.key(step), self.image
             if source is None or not source.done or key is None or image is None:
                 continue
@@ -250,6 +270,7 @@ class Core:
             values = {before: source.value}
             result = compute(step, self.engine, self.inputs, values, image=image, found=found)
             self.results.store(result)
+        self.update_inputs()
 
     def _live_layout(self) -> None:
         """Both rings' layout against its rules; needs no image."""

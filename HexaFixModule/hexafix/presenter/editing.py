@@ -18,16 +18,24 @@ Change = Callable[[Document], Document | None]
 
 SIX = 6
 
+DRAG = "dragging the fragment"
+"""Label of a movement that goes on."""
+
 
 class Edits(Core):
     """Edits of the case but for its balls, undo and redo, and what is asked a second time."""
 
-    def changed_document(self, label: str, change: Change) -> None:
-        """One edit: `change` alters its copy of the document, or returns another one."""
+    def changed_document(self, label: str, change: Change, *, joined: bool = False) -> None:
+        """One edit: `change` alters its copy of the document, or returns another one.
+
+        An edit that changes nothing is none. One that is joined becomes part of the edit before.
+        """
         document = self.version.copy()
         made = change(document)
         document = document if made is None else made
         if document == self.version.content:
+            if joined:
+                self.history.replace(replace(self.version, label=label))
             return
         try:
             raw = document_bytes(document)
@@ -38,11 +46,11 @@ class Edits(Core):
                 hazard="H55",
                 next_step="give finite numbers and plain texts",
             ) from error
-        self.keep(replace(self.version, raw=raw, label=label))
+        self.keep(replace(self.version, raw=raw, label=label), joined=joined)
 
-    def keep(self, version: Version) -> None:
+    def keep(self, version: Version, *, joined: bool = False) -> None:
         """Make a version the present one."""
-        self.history.edit(version)
+        self.history.edit(version, joined=joined)
         self.new_version()
 
     @action
@@ -105,8 +113,8 @@ class Edits(Core):
     def _set_marker_part(self, key: str, value: Any, label: str) -> None:
         self._set("markers", {**_part(self.version.copy(), "markers"), key: value}, label)
 
-    def _set(self, key: str, value: Any, label: str) -> None:
-        self.changed_document(label, lambda document: {**document, key: value})
+    def _set(self, key: str, value: Any, label: str, *, joined: bool = False) -> None:
+        self.changed_document(label, lambda document: {**document, key: value}, joined=joined)
 
     # ------------------------------------------------------------ readings, correction, schedule
 
@@ -129,10 +137,22 @@ class Edits(Core):
         self._set("strut_readings_mm", given, "set the readings")
 
     @action
-    def set_correction(self, correction: Mapping[str, Any] | None) -> None:
-        """Set the correction, of any of the four kinds, as the case file has it."""
+    def set_correction(
+        self, correction: Mapping[str, Any] | None, *, dragging: bool = False
+    ) -> None:
+        """Set the correction, of any of the four kinds, as the case file has it.
+
+        Parameters
+        ----------
+        correction : mapping or None
+        dragging : bool
+            Whether more of the same movement will follow: all of it is one undo step. The last
+            call of a movement is made without.
+        """
         given = None if correction is None else dict(correction)
-        self._set("correction", given, "set the correction")
+        going_on = self.version.label == DRAG
+        label = DRAG if dragging else "drag the fragment" if going_on else "set the correction"
+        self._set("correction", given, label, joined=going_on)
 
     @action
     def set_schedule(self, schedule: Mapping[str, Any] | None) -> None:

@@ -56,9 +56,13 @@ class History:
         self._future: list[Version] = []
         self.present = present
 
-    def edit(self, version: Version) -> None:
-        """Make `version` the present; what was undone is forgotten."""
-        self._past.append(self.present)
+    def edit(self, version: Version, *, joined: bool = False) -> None:
+        """Make `version` the present; what was undone is forgotten.
+
+        An edit that is joined takes the place of the one before: both are undone at once.
+        """
+        if not joined:
+            self._past.append(self.present)
         self._future.clear()
         self.present = version
 

@@ -76,10 +76,17 @@ class Inputs:
     version : Version
     stamp : str
         Size and time of the image's files when they were looked at last.
+    fixator_file : str
+        Hash of the fixator's own file, where the case names one, when it was looked at last.
+    readings_asked : bool
+        Whether the layouts leave an automatic numbering a choice, so that the readings settle it;
+        else neither numbering nor poses depend on them.
     """
 
     version: Version
     stamp: str = ""
+    fixator_file: str = ""
+    readings_asked: bool = False
 
     @property
     def folder(self) -> Path:
@@ -99,6 +106,12 @@ class Inputs:
             found[fault.code, fault.where, fault.what, fault.value] = fault
         return tuple(found.values())
 
+    def changed(self, **changes: Any) -> Inputs:
+        """The same version seen with other files or questions; its faults are found only once."""
+        made = replace(self, **changes)
+        made.__dict__["faults"] = self.faults
+        return made
+
     @cached_property
     def document(self) -> Mapping[str, Any]:
         """A copy of the case document for doors to look at."""
@@ -109,6 +122,12 @@ class Inputs:
         """What is right of what `Step.NUMBERING` reads: perhaps not all is there yet."""
         raw = json.dumps(self._case_document(Step.NUMBERING)).encode()
         return parts_of(raw, folder=self.folder)
+
+    @property
+    def readings_could_settle(self) -> bool:
+        """Whether there are readings for an automatic numbering to ask."""
+        given = self.version.content
+        return not given.get("numbering") and given.get("strut_readings_mm") is not None
 
     def faults_shown_at(self, step: Step) -> tuple[Fault, ...]:
         """The faults that belong to a step."""
@@ -123,6 +142,12 @@ class Inputs:
     def image_path(self) -> Path:
         """The image, absolute."""
         return (self.folder / self.version.content["image"]["path"]).resolve()
+
+    @property
+    def fixator_path(self) -> Path | None:
+        """The fixator's own file, where the case may name one."""
+        given = self.version.content.get("fixator")
+        return self.folder / given if isinstance(given, str) else None
 
     @property
     def series_instance_uid(self) -> str | None:
@@ -150,12 +175,12 @@ class Inputs:
         if step in (Step.SCHEDULE, Step.EXPORT):
             return {
                 "raw": hashlib.sha256(self.version.raw).hexdigest(),
-                "fixator": self._fixator_file,
+                "fixator": self.fixator_file,
                 "relaxed": self.version.relaxed,
             }
         return {
             "case": self._case_document(step),
-            "fixator": self._fixator_file,
+            "fixator": self.fixator_file,
             "relaxed": self.version.relaxed and step != Step.NUMBERING,
         }
 
@@ -205,30 +230,19 @@ class Inputs:
         """The parts of the case that a step reads; parts it can do without only where right."""
         given = self.version.content
         wrong = {owner(fault.where)[0] for fault in self.faults}
-        kept = ["schema_version", "markers", "marker_edits", "numbering", "fixator"]
+        kept = ["markers", "marker_edits", "numbering", "fixator"]
         if step != Step.NUMBERING:
             kept.append("limb")
         late = step in (Step.READINGS, Step.CORRECTION)
-        # readings settle an automatic numbering where layouts alone do not
-        if Step.READINGS not in wrong and (late or not given.get("numbering")):
+        if Step.READINGS not in wrong and (late or self.readings_asked):
             kept.append("strut_readings_mm")
         if step == Step.CORRECTION:
             kept.append("correction")
             if Step.SCHEDULE not in wrong:
                 kept.append("schedule")
         image = {"path": NO_IMAGE, "series_instance_uid": None}
-        return {"case_id": "case", "image": image, **{k: given[k] for k in kept if k in given}}
-
-    @cached_property
-    def _fixator_file(self) -> str | None:
-        """Hash of the fixator's file, where the case names one beside it."""
-        given = self.version.content.get("fixator")
-        if not isinstance(given, str):
-            return None
-        try:
-            return hashlib.sha256((self.folder / given).read_bytes()).hexdigest()
-        except (OSError, ValueError):
-            return None
+        made = {"schema_version": 2, "case_id": "case", "image": image}
+        return {**made, **{key: given[key] for key in kept if key in given}}
 
 
 def _hash(value: Any) -> str:
@@ -242,4 +256,12 @@ def stamp_of(path: Path) -> str:
         files = sorted(path.iterdir()) if path.is_dir() else [path]
         return _hash([[f.name, f.stat().st_size, f.stat().st_mtime_ns] for f in files])
     except OSError:
+        return ""
+
+
+def file_hash(path: Path) -> str:
+    """Hash of a file's content; empty where there is none."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except (OSError, ValueError):
         return ""

@@ -196,6 +196,7 @@ class Work(Core):
     def _begin_step(self, job: Job) -> tuple[Step, Inputs, str, dict[Step, Any]] | None:
         with self.lock:
             job.next_step()
+            self.update_inputs()
             target = self._target or Step.LOAD
             values = {}
             for step in ORDER[: ORDER.index(target) + 1]:
