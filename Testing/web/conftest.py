@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+
 CHROMIUM = "/usr/bin/chromium"
 
 CHROMIUM_FLAGS = [

@@ -31,6 +31,7 @@ def a_workstation(a_loop, a_case_on_disk):
     from hexafix.presenter import Step
     from hexafix.web.app import Workstation, started_presenter
     from hexafix.web.run import prepare_environment
+    from trame_slicer.views.render_scheduler import NoScheduleRendering
 
     prepare_environment()
 
@@ -44,6 +45,7 @@ def a_workstation(a_loop, a_case_on_disk):
 
     workstation = a_loop.run_until_complete(make())
     for view in workstation.app.view_manager.get_views():
+        view.set_scheduled_render(NoScheduleRendering())
         view.update_size(*SIZE)
         view.fit_view_to_content()
     yield workstation

@@ -1,13 +1,9 @@
 """Which side of the patient stands at which edge, and which point is under a pixel."""
 
-import os
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
 
 SIZE, FIELD_MM = (200, 100), (100.0, 50.0)
 

@@ -34,7 +34,9 @@ html { overflow: hidden; }
 .hx-aim, .hx-aim * { cursor: crosshair !important; }
 .hx-over { position: absolute; pointer-events: none; color: #ffffff; user-select: none;
   text-shadow: 0 0 3px #000, 0 0 3px #000; font-size: 14px; line-height: 1.25; }
-.hx-name { top: 6px; left: 10px; }
+.hx-whole { position: absolute; inset: 0; pointer-events: none; }
+.hx-name { top: 6px; left: 10px; font-weight: 600; }
+.hx-position { top: 24px; left: 10px; font-variant-numeric: tabular-nums; }
 .hx-edge { font-size: 18px; font-weight: 700; color: #ffe082; }
 .hx-left { left: 8px; top: 50%; transform: translateY(-50%); }
 .hx-right { right: 8px; top: 50%; transform: translateY(-50%); }
@@ -80,11 +82,18 @@ def over_slice(server: Any, view_id: str, view: Any) -> None:
 
     for what in ("position", *EDGES):
         server.state.setdefault(state_name(view_id, what), "")
-    with html.Div(classes="hx-over hx-name"):
-        html.Div(VIEW_NAMES[view.get_singleton_tag()], style="font-weight: 600;")
-        html.Div(f"{{{{ {state_name(view_id, 'position')} }}}}")
+    name_over(view)
+    html.Div(
+        f"{{{{ {state_name(view_id, 'position')} }}}}",
+        classes="hx-over hx-position",
+        raw_attrs=[f'data-testid="{view_id}-position"'],
+    )
     for edge in EDGES:
-        html.Div(f"{{{{ {state_name(view_id, edge)} }}}}", classes=f"hx-over hx-edge hx-{edge}")
+        html.Div(
+            f"{{{{ {state_name(view_id, edge)} }}}}",
+            classes=f"hx-over hx-edge hx-{edge}",
+            raw_attrs=[f'data-testid="{view_id}-{edge}"'],
+        )
     reset_button(view)
     with html.Div(classes="hx-slider"):
         Slider(typed_state=connect_slice_view_slider_to_state(server, view), density="compact")
@@ -108,10 +117,17 @@ def follow_slice(server: Any, view_id: str, view: Any) -> None:
 
 def over_space(server: Any, view_id: str, view: Any) -> None:
     """What lies over the 3D view."""
+    name_over(view)
+    reset_button(view)
+
+
+def name_over(view: Any) -> None:
+    """The view's name; tests find the whole view by it."""
     from trame.widgets import html
 
-    html.Div(VIEW_NAMES[view.get_singleton_tag()], classes="hx-over hx-name")
-    reset_button(view)
+    tag = view.get_singleton_tag()
+    html.Div(classes="hx-whole", raw_attrs=[f'data-testid="over-{tag}"'])
+    html.Div(VIEW_NAMES[tag], classes="hx-over hx-name")
 
 
 def reset_button(view: Any) -> None:
