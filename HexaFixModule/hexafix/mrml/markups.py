@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from hexafix.hardware import MarkerLayout
 from hexafix.markers import BallSet
 from hexafix.mrml.geometry import lps_points, ras_points
+from hexafix.mrml.models import keep_colour
 from hexafix.mrml.nodes import PREFIX, ensure_displayed, find
 from hexafix.surfaces import ring_colour
 
@@ -155,6 +156,8 @@ def put_points(
     if node.GetAttribute(ROWS) is None:
         style(display, colour, glyph=glyph, paper=paper)
         display.SetVisibility2D(in_slices)
+        if paper is None:
+            keep_colour(node, colour)
     if node.GetAttribute(ROWS) != rows or not _as_given(node, points):
         _fill(node, points, rows)
     node.SetLocked(locked)

@@ -46,7 +46,7 @@ def put_model(
     node, display = ensure_displayed(scene, CLASS, role, name)
     node.SetAndObserveMesh(in_ras(shape_lps))
     state = display.StartModify()
-    node.SetAttribute(COLOUR, " ".join(f"{c:.6f}" for c in colour))
+    keep_colour(node, colour)
     display.SetColor(*colour)
     display.SetSelectedColor(*colour)
     display.SetOpacity(opacity)
@@ -60,6 +60,11 @@ def put_model(
     display.SetBackfaceCulling(False)
     display.EndModify(state)
     return node
+
+
+def keep_colour(node: Any, colour: Colour) -> None:
+    """Remember the colour of a fresh result, for `set_stale`."""
+    node.SetAttribute(COLOUR, " ".join(f"{c:.6f}" for c in colour))
 
 
 def in_ras(shape_lps: Any) -> Any:
@@ -98,9 +103,11 @@ def set_stale(scene: Any, prefixes: Iterable[str], stale: bool) -> None:
             if display is None or kept is None:
                 continue
             wanted = STALE_COLOUR if stale else tuple(float(c) for c in kept.split())
-            if any(abs(a - b) > 1e-5 for a, b in zip(display.GetColor(), wanted, strict=True)):
-                display.SetColor(*wanted)
+            shown = display.GetSelectedColor()
+            if any(abs(a - b) > 1e-5 for a, b in zip(shown, wanted, strict=True)):
                 display.SetSelectedColor(*wanted)
+                if not node.IsA("vtkMRMLMarkupsNode"):
+                    display.SetColor(*wanted)
 
 
 def set_shown(scene: Any, prefixes: Iterable[str], shown: bool) -> None:

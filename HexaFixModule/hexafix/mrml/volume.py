@@ -114,7 +114,8 @@ def volume_of(node: Any) -> Volume:
     # The matrix as it was read, not as the node's direction cosines and spacings rebuild it.
     affine = affine if stored is None else stored
     found = fingerprint(voxels, affine)
-    source = _source(node) if node.GetAttribute(CONTENT) == found else None
+    untouched = stored is not None and node.GetAttribute(CONTENT) == found
+    source = _source(node) if untouched else None
     if source is None:
         known = node.GetAttribute(CONTENT) is not None
         source = ImageSource(sha256=found, warnings=(CHANGED if known else FOREIGN,))
