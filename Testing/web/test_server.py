@@ -35,7 +35,7 @@ def a_guarded_server():
         app = web.Application()
         Guard(Access(host="127.0.0.1", port=0, token=TOKEN), "default-src 'self'").install(app)
         add_downloads(app, lambda: held["files"])
-        app.router.add_get("/", page)
+        app.router.add_route("*", "/", page)
         app.router.add_get("/ws", socket)
         runner = web.AppRunner(app, handle_signals=False)
         await runner.setup()
