@@ -214,6 +214,20 @@ def test_without_readings_a_symmetric_layout_stays_open(a_symmetric_ring):
     assert judge_by_struts(None, np.full(6, 170.0)) is None
 
 
+def test_the_users_numbers_of_a_symmetric_layout_are_not_unique(a_symmetric_ring):
+    """What G7 refuses in the chain is told at once."""
+    balls, case, readings = a_symmetric_ring
+    own = {
+        n: k
+        for k, n in enumerate((*case(readings).proximal.numbers, *case(readings).distal.numbers))
+    }
+    parts = case(readings)
+    document = judge_numbering(balls, proximal=parts.proximal, distal=parts.distal, assigned=own)
+    assert codes(document) == ["numbering-ambiguous"]
+    assert not document["complete"]
+    assert document["rings"]["proximal"]["next_best_mm"] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_without_layouts_there_is_nothing_to_judge(tmp_path, a_recognised):
     with pytest.raises(HexaFixError) as error:
         judge_case_numbering(parts_of(b"{}", folder=tmp_path), a_recognised.balls)
