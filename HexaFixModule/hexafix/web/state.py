@@ -93,6 +93,8 @@ class PanelState:
     table_target: dict = field(default_factory=_table)
     table_schedule: dict = field(default_factory=_table)
     table_strut_plan: dict = field(default_factory=_table)
+    gates_words: str = ""
+    gates_red: bool = False
     can_export: bool = False
     export_blocked_by: str = ""
     export_folder: str = ""
@@ -134,9 +136,18 @@ def snapshot_words(snapshot: Snapshot) -> dict[str, Any]:
         "export_folder": str(snapshot.export_folder or ""),
         "confirmed": dict(snapshot.confirmed),
     }
+    words |= gate_words(snapshot.tables.get("gates"))
     for name in TABLES:
         words[table_name(name)] = table_words(snapshot.tables.get(name))
     return words
+
+
+def gate_words(table: Table | None) -> dict[str, Any]:
+    """How many gates there are and whether one is red, in one line."""
+    red = [alert for alert in table.alerts if alert] if table else []
+    count = len(table.rows) if table else 0
+    told = f"{len(red)} of {count} RED" if red else f"all {count} pass"
+    return {"gates_words": f"Safety gates: {told}", "gates_red": bool(red)}
 
 
 def _step_words(view: Any) -> dict[str, Any]:

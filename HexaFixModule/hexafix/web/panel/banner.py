@@ -63,7 +63,7 @@ class Banners:
             **marked("banner-line", data_kind=("banner.kind",), data_code=("banner.code",)),
         ):
             v.VIcon(icon=("banner.icon",), size="x-small", color=("banner.color",))
-            html.Span("{{ banner.title }}")
+            html.Span("{{ banner.title }}: {{ banner.message }}")
 
     def _notice(self) -> None:
         """What could not be done just now, apart from the steps."""

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from hexafix.web.files import listing, start_folder
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.widgets import button, icon_button, marked, note
-from hexafix.web.state import NAMESPACE
 
 
 @dataclass
@@ -42,11 +41,8 @@ class Chooser:
     """Asks for a path on the server and hands it to who asked."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, ChooserState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, ChooserState)
         self._suffixes: tuple[str, ...] = ()
         self._take: Callable[[Path], Any] = lambda _: None
 

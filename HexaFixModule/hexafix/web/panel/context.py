@@ -5,14 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from hexafix.errors import HexaFixError, InputError
 from hexafix.web.panel.controls import ViewControls
+from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Presenter
     from hexafix.web.state import PanelState
+
+State = TypeVar("State")
 
 _NUMBER = re.compile(r"[+-]?[0-9]{1,6}(\.[0-9]{1,9})?")
 
@@ -90,6 +93,14 @@ class PanelContext:
                 keys[name] = keys.get(name, 0) + (name != field)
             self.data.field_keys = keys
             self.data.field_errors = {}
+
+
+def typed_state(server: Any, kind: type[State]) -> tuple[State, State]:
+    """Values and names of a part's own state; setting a value sends it to the browser."""
+    from trame_server.utils.typed_state import TypedState
+
+    typed = TypedState(server.state, kind, namespace=NAMESPACE)
+    return cast(State, typed.data), cast(State, typed.name)
 
 
 def number(text: Any, *, where: str) -> float:

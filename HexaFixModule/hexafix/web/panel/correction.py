@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from hexafix.web.panel import draft as drafts
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.landmarks import Landmarks
 from hexafix.web.panel.widgets import button, icon_button, marked, note, table
-from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
@@ -30,11 +29,14 @@ class CorrectionState:
         See `hexafix.web.panel.draft`.
     dragging : bool
         Whether the handles of the bone fragment are shown.
+    pending : str
+        Says that the fields are not what the case holds; empty where they are.
     picking : bool
         Whether the next click in a view gives the centre or origin.
     """
 
     draft: dict = field(default_factory=drafts.empty)
+    pending: str = ""
     dragging: bool = False
     picking: bool = False
 
@@ -43,14 +45,13 @@ class CorrectionStep:
     """Four forms of a correction, its end strut lengths live."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, CorrectionState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
-        self._landmarks = Landmarks(context)
+        self._data, self._name = typed_state(context.server, CorrectionState)
+        self._landmarks = Landmarks(context, self._judge_draft)
         self._shown: Any = None
+        self._set: Any = None
         self._centered = False
+        context.server.state.change(self._name.draft)(self._judge_draft)
 
     def build(self) -> None:
         """Make the four forms and the table of the end strut lengths."""
@@ -77,16 +78,30 @@ class CorrectionStep:
                     words, value=kind, size="small", classes="text-none", **marked(f"kind-{kind}")
                 )
         self._moving()
-        with html.Div(v_if=f"{draft}.kind === 'fragment-motion'", **marked("form-motion")):
+        with html.Div(
+            v_if=f"{draft}.kind === 'fragment-motion'", classes="hxp-form", **marked("form-motion")
+        ):
             self._motion()
-        with html.Div(v_if=f"{draft}.kind === 'landmarks'", **marked("form-landmarks")):
+        with html.Div(
+            v_if=f"{draft}.kind === 'landmarks'", classes="hxp-form", **marked("form-landmarks")
+        ):
             self._landmarks.build(f"{draft}.moving")
-        with html.Div(v_if=f"{draft}.kind === 'deformity'", **marked("form-deformity")):
+        with html.Div(
+            v_if=f"{draft}.kind === 'deformity'", classes="hxp-form", **marked("form-deformity")
+        ):
             self._deformity()
-        with html.Div(v_if=f"{draft}.kind === 'target-pose'", **marked("form-target")):
+        with html.Div(
+            v_if=f"{draft}.kind === 'target-pose'", classes="hxp-form", **marked("form-target")
+        ):
             note("Where the proximal ring stands in the distal ring at the end.")
             self._three("position", XYZ, "mm")
             self._three("target_angles", ANGLES, "deg")
+        html.Div(
+            f"{{{{ {name.pending} }}}}",
+            v_if=name.pending,
+            classes="hxp-pending",
+            **marked("correction-pending", role="status"),
+        )
         button(
             "Set the correction",
             "set-correction",
@@ -214,11 +229,26 @@ class CorrectionStep:
             new["center"] = words if not all(new["center"]) else new["center"]
             new["origin"] = words if not all(new["origin"]) else new["origin"]
             self._shown = None
-        if correction and correction != self._shown:
-            new = drafts.of_document(correction, new)
+        if correction != self._shown:
             self._shown = correction
+            new = drafts.of_document(correction, new) if correction else new
             self._landmarks.take(correction)
+            self._set = new if correction else None
         self._data.draft = new
+        self._judge_draft()
+
+    def _judge_draft(self, **_: Any) -> None:
+        """Say so where the fields hold something that the case does not."""
+        held, draft = self._set, self._data.draft
+        if held is None:
+            self._data.pending = ""
+        elif draft["kind"] != held["kind"]:
+            kind = drafts.KINDS[held["kind"]].lower()
+            self._data.pending = f"Not set: the case holds a correction by {kind}."
+        elif draft != held or (draft["kind"] == "landmarks" and self._landmarks.changed):
+            self._data.pending = "Not set: these values differ from those of the case."
+        else:
+            self._data.pending = ""
 
     def stop(self) -> None:
         """Leave picking; dragging stays."""

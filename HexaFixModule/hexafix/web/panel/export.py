@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from hexafix.export import MANIFEST
 from hexafix.web.panel.chooser import Chooser
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.prescription import PrescriptionPages
 from hexafix.web.panel.widgets import button, marked, note, title
-from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
@@ -44,11 +43,8 @@ class ExportStep:
     """Confirm the side, make the prescription, look at it, download or export it."""
 
     def __init__(self, context: PanelContext, chooser: Chooser, pages: PrescriptionPages) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context, self._chooser, self._pages = context, chooser, pages
-        typed = TypedState(context.server.state, ExportState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, ExportState)
 
     def build(self) -> None:
         """Make the question, the pages and the files."""

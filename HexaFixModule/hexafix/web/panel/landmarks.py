@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from hexafix.errors import InputError
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.widgets import button, icon_button, marked, note
-from hexafix.web.state import NAMESPACE
 
 LEAST_PAIRS = 3
 
@@ -31,20 +30,30 @@ class LandmarksState:
 
 
 class Landmarks:
-    """At least three pairs: a point of the moving fragment and where it belongs."""
+    """At least three pairs: a point of the moving fragment and where it belongs.
 
-    def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
+    Parameters
+    ----------
+    context : PanelContext
+    edited : callable
+        Called after each edit of the pairs.
+    """
 
-        self._context = context
-        typed = TypedState(context.server.state, LandmarksState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+    def __init__(self, context: PanelContext, edited: Callable[[], Any]) -> None:
+        self._context, self._edited = context, edited
+        self._data, self._name = typed_state(context.server, LandmarksState)
         self._points: list[dict[str, list[float] | None]] = []
+        self._held: list[dict[str, list[float] | None]] = []
 
     @property
     def picking(self) -> bool:
         """Whether a click in a view is waited for."""
         return bool(self._data.picking)
+
+    @property
+    def changed(self) -> bool:
+        """Whether the pairs are not those of the case."""
+        return self._points != self._held
 
     def build(self, moving: str) -> None:
         """Make the table of pairs.
@@ -89,14 +98,16 @@ class Landmarks:
                     )
         button("Add a pair", "add-pair", self._add, icon="mdi-plus")
 
-    def take(self, correction: Mapping[str, Any]) -> None:
+    def take(self, correction: Mapping[str, Any] | None) -> None:
         """Show a correction of the document, if it is one by landmarks."""
-        if correction["kind"] != "landmarks":
+        if correction is None or correction["kind"] != "landmarks":
+            self._held = []
             return
         pairs = zip(
             correction["moving_points_lps_mm"], correction["fixed_points_lps_mm"], strict=True
         )
         self._points = [{"moving": [*moving], "fixed": [*fixed]} for moving, fixed in pairs]
+        self._held = [dict(pair) for pair in self._points]
         self._show()
 
     def to_document(self, moving: str) -> dict[str, Any]:
@@ -136,6 +147,7 @@ class Landmarks:
             [pair["moving"] for pair in self._points if pair["moving"]],
             [pair["fixed"] for pair in self._points if pair["fixed"]],
         )
+        self._edited()
 
     def _add(self) -> None:
         self._points.append({"moving": None, "fixed": None})

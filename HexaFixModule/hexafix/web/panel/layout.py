@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from hexafix.web.panel.context import PanelContext, number, whole_number
+from hexafix.web.panel.context import PanelContext, number, typed_state, whole_number
 from hexafix.web.panel.widgets import button, icon_button, marked
 from hexafix.web.panel.widgets import field as text_field
-from hexafix.web.state import NAMESPACE, number_words
+from hexafix.web.state import number_words
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
@@ -34,11 +34,8 @@ class LayoutEditor:
     """Installation parameters of the markers, ring by ring."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, LayoutState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, LayoutState)
 
     def build(self) -> None:
         """Make both rings' tables of fields."""

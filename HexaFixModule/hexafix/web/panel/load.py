@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from hexafix.web.files import IMAGE_SUFFIXES, start_folder
 from hexafix.web.panel.chooser import Chooser
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.widgets import button, choice, marked, note, table, title
 from hexafix.web.panel.widgets import field as text_field
-from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
@@ -39,11 +38,8 @@ class LoadStep:
     """Case id, limb, fixator, image and series."""
 
     def __init__(self, context: PanelContext, chooser: Chooser) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context, self._chooser = context, chooser
-        typed = TypedState(context.server.state, LoadState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, LoadState)
 
     def build(self) -> None:
         """Make the step's fields and tables."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hexafix.web.panel.context import PanelContext, number
+from hexafix.web.panel.context import PanelContext, number, typed_state
 from hexafix.web.panel.widgets import button, field, icon_button, marked, note, table
-from hexafix.web.state import NAMESPACE
 
 
 @dataclass
@@ -30,11 +29,8 @@ class MarkersStep:
     """Ball diameter, found and rejected balls; add by click, move, remove."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, MarkersState, namespace=NAMESPACE)
-        self.data, self.name = typed.data, typed.name
+        self.data, self.name = typed_state(context.server, MarkersState)
 
     def build(self) -> None:
         """Make the step's fields and tables."""

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.layout import LayoutEditor
 from hexafix.web.panel.widgets import button, icon_button, marked, note
-from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
@@ -52,12 +51,9 @@ class NumberingStep:
     """Numbers as tiles: click two to swap them, click one and a ball to assign it."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
         self._layout = LayoutEditor(context)
-        typed = TypedState(context.server.state, NumberingState, namespace=NAMESPACE)
-        self.data, self.name = typed.data, typed.name
+        self.data, self.name = typed_state(context.server, NumberingState)
 
     def build(self) -> None:
         """Make the tiles of both rings and the strip of balls."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hexafix.export import MANIFEST, manifest
 from hexafix.web.panel.banner import Banners
 from hexafix.web.panel.chooser import Chooser
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.controls import ViewControls
 from hexafix.web.panel.correction import CorrectionStep
 from hexafix.web.panel.export import ExportStep
@@ -23,7 +23,7 @@ from hexafix.web.panel.readings import ReadingsStep
 from hexafix.web.panel.schedule import ScheduleStep
 from hexafix.web.panel.stepper import Stepper
 from hexafix.web.panel.toolbar import Toolbar
-from hexafix.web.state import NAMESPACE, PanelState, form_words, snapshot_words
+from hexafix.web.state import PanelState, form_words, snapshot_words
 
 if TYPE_CHECKING:
     from hexafix.presenter import Presenter, Snapshot
@@ -44,8 +44,6 @@ class Panel:
     """
 
     def __init__(self, server: Any, presenter: Presenter, controls: ViewControls) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         server.enable_module(
             {
                 "serve": {"__hexafix": str(STATIC)},
@@ -53,10 +51,8 @@ class Panel:
                 "styles": ["__hexafix/panel.css"],
             }
         )
-        typed = TypedState(server.state, PanelState, namespace=NAMESPACE)
-        self._context = context = PanelContext(
-            server, presenter, controls, data=typed.data, name=typed.name
-        )
+        data, name = typed_state(server, PanelState)
+        self._context = context = PanelContext(server, presenter, controls, data=data, name=name)
         self._chooser = Chooser(context)
         self._bar = Toolbar(context, self._chooser)
         self._banners = Banners(context)

@@ -6,17 +6,20 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.prescription import data_address
 from hexafix.web.panel.struts import badge
 from hexafix.web.panel.widgets import icon_button, marked, picture
-from hexafix.web.state import NAMESPACE
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot
 
 STEP_S = 0.35
 """Time between two adjustments while playing."""
+
+
+TODAY = {"turn": "", "way": "today", "arrow": ""}
+"""What stands beside a reading of today: nothing is turned yet."""
 
 
 @dataclass
@@ -28,7 +31,7 @@ class PlaybackState:
     row, last : int
         The shown row and the last one; row 0 is today.
     struts : list of dict
-        value, turn, way (``longer``, ``shorter`` or ``no turn``), arrow.
+        value, turn, way (``longer``, ``shorter``, ``no turn`` or ``today``), arrow.
     curves : str
         Curves of all struts with the shown row marked, as a data address.
     """
@@ -47,12 +50,8 @@ class Playback:
     """Moves frame and bone through the plan."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, PlaybackState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
-        self._typed = typed
+        self._data, self._name = typed_state(context.server, PlaybackState)
         self._playback: Any = None
         self._rows: tuple[tuple[str, ...], ...] = ()
         self._document: Any = None
@@ -92,7 +91,7 @@ class Playback:
                     **marked("play-slider", label="Adjustment of the plan"),
                 )
                 html.Span(
-                    f"{{{{ {name.when} }}}}",
+                    f"{{{{ {name.when} }}}}{{{{ {name.fresh} ? '' : ' · out of date' }}}}",
                     classes="hxp-when",
                     **marked("play-when", role="status"),
                 )
@@ -163,7 +162,7 @@ class Playback:
         self._data.row = row
         self._data.when = when_words(self._rows[row], self._rows[-1][0])
         self._data.struts = [
-            {"value": value, **turn_words(float(by), change)}
+            {"value": value, **(turn_words(float(by), change) if row else TODAY)}
             for value, by, change in zip(words, turned, format_change(before, words), strict=True)
         ]
         self._data.curves = data_address(strut_curves_at(self._document, row), "image/svg+xml")
@@ -190,9 +189,12 @@ class Playback:
         self._task = asyncio.get_running_loop().create_task(self._play())
 
     async def _play(self) -> None:
-        state = self._context.server.state
+        state, clock = self._context.server.state, asyncio.get_running_loop().time
         while self._data.row < self._data.last:
+            due = clock() + STEP_S
             await asyncio.sleep(STEP_S)
+            # a machine that is late drawing gets as much time again, so that clicks come through
+            await asyncio.sleep(max(0.0, clock() - due))
             with state:
                 self._next()
         with state:

@@ -36,7 +36,14 @@ class PosesStep:
             **marked("confirm-ring-front"),
         )
         note("The answer is printed in the prescription.")
-        table(context, "gates", "Safety gates")
+        with html.Details(
+            v_if=f"{name.table_gates}.rows.length",
+            classes="hxp-details",
+            open=(f"{name.gates_red}",),
+            **marked("gates", data_red=(name.gates_red,)),
+        ):
+            html.Summary(f"{{{{ {name.gates_words} }}}}", **marked("gates-summary"))
+            table(context, "gates", "Each gate with its limit")
         title("Marker layout")
         with html.Div(classes="hxp-grid-2"):
             for ring in ("proximal", "distal"):

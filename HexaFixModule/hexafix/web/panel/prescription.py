@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.widgets import icon_button, marked, picture
-from hexafix.web.state import NAMESPACE
 
 PDF = "prescription.pdf"
 
@@ -37,10 +36,7 @@ class PrescriptionPages:
     """Pages of the fresh prescription, drawn once and sent one at a time."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
-        typed = TypedState(context.server.state, PrescriptionState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, PrescriptionState)
         self._held = ""
         self._images: list[bytes] = []
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from hexafix.web.panel.context import PanelContext, number
+from hexafix.web.panel.context import PanelContext, number, typed_state
 from hexafix.web.panel.struts import badge
 from hexafix.web.panel.widgets import field as text_field
 from hexafix.web.panel.widgets import marked, note, table
-from hexafix.web.state import NAMESPACE
 
 
 @dataclass
@@ -28,11 +27,8 @@ class ReadingsStep:
     """Readings, second entry, comparison with the CT."""
 
     def __init__(self, context: PanelContext) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context = context
-        typed = TypedState(context.server.state, ReadingsState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, ReadingsState)
 
     def build(self) -> None:
         """Make the step's fields and table."""

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from hexafix.web.files import CASE_SUFFIXES
 from hexafix.web.panel.chooser import Chooser
-from hexafix.web.panel.context import PanelContext
+from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.widgets import button, icon_button, marked
-from hexafix.web.state import NAMESPACE
 
 NOTICE = "Research software. Not a medical device. Plans are not approved."
 """Always on screen."""
@@ -26,11 +25,8 @@ class Toolbar:
     """Case file, undo and redo, progress."""
 
     def __init__(self, context: PanelContext, chooser: Chooser) -> None:
-        from trame_server.utils.typed_state import TypedState
-
         self._context, self._chooser = context, chooser
-        typed = TypedState(context.server.state, ToolbarState, namespace=NAMESPACE)
-        self._data, self._name = typed.data, typed.name
+        self._data, self._name = typed_state(context.server, ToolbarState)
         context.server.trigger("hx_undo")(self.undo)
         context.server.trigger("hx_redo")(self.redo)
 

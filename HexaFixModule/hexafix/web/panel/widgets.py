@@ -7,7 +7,7 @@ from typing import Any
 
 from hexafix.web.panel.context import PanelContext
 
-Bound = str | tuple[str]
+Bound = str | tuple[Any]
 """A text, or in a tuple an expression of the browser's template."""
 
 
