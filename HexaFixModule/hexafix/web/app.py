@@ -78,7 +78,7 @@ class Workstation:
         from hexafix.mrml.sync import SceneSync
         from hexafix.web.panel import Panel
 
-        self.server = server or get_server(f"hexafix-{id(self)}", client_type="vue3")
+        self.server: Any = server or get_server(f"hexafix-{id(self)}", client_type="vue3")
         self.server.enable_module(trame_slicer_module)
         self.state, self.ctrl = self.server.state, self.server.controller
         quiet_vtk()

@@ -214,10 +214,10 @@ class Views:
 
     def _show_volume(self, volume: Any) -> None:
         """The CT in all slice views, whole, at the suggested window; or none."""
-        node = self._logic.volume_node() if volume is not None else None
         self.window.let_go()
-        if node is None:
+        if volume is None:
             return
+        node: Any = self._logic.volume_node()
         from hexafix.pipeline import image_document
 
         shown = image_document(volume)
@@ -267,8 +267,9 @@ def prepare_space(view: Any) -> None:
 
     Depth peeling of the few see-through planes would make every picture three times as slow.
     """
-    from slicer import vtkMRMLAbstractViewNode as Node
+    import slicer
 
+    node: Any = slicer.vtkMRMLAbstractViewNode  # type: ignore[attr-defined]
     view.renderer().SetUseDepthPeeling(False)
-    view.set_orientation_marker(Node.OrientationMarkerTypeCube, Node.OrientationMarkerSizeMedium)
+    view.set_orientation_marker(node.OrientationMarkerTypeCube, node.OrientationMarkerSizeMedium)
     view.set_box_visible(False)
