@@ -34,16 +34,17 @@ def a_case_file(a_phantom, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def a_planned_scene(a_scene, a_phantom, a_case_file):
-    """Scene, volume node, plan document and export of the entrance's logic."""
+def a_planned_scene(a_scene, a_phantom, a_case_file, top):
+    """Scene, volume node, plan document and export of the script that the document prints."""
     from hexafix.mrml import SceneLogic
 
-    import HexaFixModule
-
+    page = (top / "Resources/Documents/slicer-module.md").read_text()
+    code = page.split("<!-- tested by Testing/slicer_module -->\n```python\n")[1].split("```")[0]
     node = SceneLogic(a_scene).add_volume(a_phantom.volume)
-    logic = HexaFixModule.HexaFixModuleLogic(scene=a_scene)
     out = a_case_file.parent / "export"
-    return a_scene, node, logic.plan(node, a_case_file, out), out
+    given = {"scene": a_scene, "volumeNode": node, "caseFile": a_case_file, "folder": out}
+    exec(compile(code, "slicer-module.md", "exec"), given)
+    return a_scene, node, given["document"], out
 
 
 def test_without_slicer_the_four_classes_are_there_and_nothing_is_loaded(run_python):

@@ -64,6 +64,14 @@ def test_the_panel_opens_and_an_edit_and_undo_go_through_its_widgets(a_walk):
     assert "phantom-11" in seen["case_label"]
 
 
+def test_the_case_of_an_opened_scene_is_taken_over_but_for_its_image(a_walk):
+    """What the scene says of its image leads nowhere (H51); a case of one's own stays."""
+    seen = a_walk[0]
+    assert seen["scene_case"] == {"case_id": "of-the-scene", "image": None}
+    assert seen["scene_balls_diameter"] == 10.0
+    assert seen["own_case"] == "of-the-panel"
+
+
 def test_the_chain_runs_off_the_interface_and_comes_back_to_its_thread(a_walk):
     seen = a_walk[0]
     assert seen["busy_at_once"]

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import threading
+from pathlib import Path
 
 from desktop_slicer import Slicer, unwrap
 from PySide6 import QtWidgets
@@ -16,6 +17,7 @@ slicer_app = Slicer()
 main_thread = threading.get_ident()
 
 import slicer  # noqa: E402
+from hexafix.mrml import SceneLogic  # noqa: E402
 from hexafix.mrml.nodes import ROLE, nodes_of  # noqa: E402
 from hexafix.mrml.nodes import find as find_node  # noqa: E402
 from hexafix.presenter import Step  # noqa: E402
@@ -39,11 +41,21 @@ seen["described"] = {
     "icon": not described.icon.isNull(),
 }
 
+# A scene that was saved by HexaFix is open already.
+held = json.loads(Path(sys.argv[1]).read_text())
+SceneLogic(slicer.mrmlScene).save_case_into({**held, "case_id": "of-the-scene"})
 widget = HexaFixModule.HexaFixModuleWidget(parent)
 widget.setup()
 widget.enter()
 shell = widget.panel
 presenter = shell.presenter
+seen["scene_case"] = {key: presenter.snapshot.document.get(key) for key in ("case_id", "image")}
+seen["scene_balls_diameter"] = presenter.snapshot.document["markers"]["ball_diameter_mm"]
+presenter.undo()
+presenter.set_case_id("of-the-panel")
+SceneLogic(slicer.mrmlScene).save_case_into({**held, "case_id": "of-another-scene"})
+slicer.mrmlScene.InvokeEvent(slicer.mrmlScene.EndImportEvent)
+seen["own_case"] = presenter.snapshot.document["case_id"]
 seen["opened"] = unwrap(parent).findChild(QtWidgets.QWidget, "stepStack") is not None
 
 

@@ -88,8 +88,12 @@ class SlicerPanel:
         self.panel.dragging_changed.connect(self._drag)
         self.presenter.changed.connect(self._changed)
         self._clicks = SliceClicks(host.slicer().app.layoutManager(), self._clicked, self._released)
-        end = self._scene.EndCloseEvent
-        self._observers.append(self._scene.AddObserver(end, lambda *_: self._scene_closed()))
+        for event, call in (
+            (self._scene.EndCloseEvent, self._scene_closed),
+            (self._scene.EndImportEvent, self._scene_opened),
+        ):
+            tag = self._scene.AddObserver(event, lambda *_, call=call: call())
+            self._observers.append(tag)
 
     def _join_scene(self) -> None:
         from hexafix.mrml.sync import SceneSync
@@ -101,10 +105,28 @@ class SlicerPanel:
         self.sync.close()
         self._join_scene()
 
+    def _scene_opened(self) -> None:
+        """Take over the case of an opened scene, unless the panel has one of its own.
+
+        The CT has to be chosen again: a scene does not say where it came from (H51).
+        """
+        from hexafix.mrml.parameter_node import IN_THE_SCENE
+
+        snapshot = self.presenter.snapshot
+        if snapshot.case_path is not None or snapshot.edited or snapshot.can_undo:
+            return
+        document = self.logic.case_document_from_scene()
+        if document is None:
+            return
+        if document.get("image", {}).get("path") == IN_THE_SCENE:
+            del document["image"]
+        self.presenter.edit("take over the case of the scene", lambda _: document)
+
     def enter(self) -> None:
         """The user came to the module: watch the views, bring the scene up to date."""
         if self.panel is not None:
             self._clicks.start()
+            self._guarded(self._scene_opened)
             self._guarded(lambda: self.sync.update(self.presenter.snapshot))
 
     def exit(self) -> None:
