@@ -1,13 +1,21 @@
-"""How many threads HexaFix's own pools use: one setting, and no result depends on it (H57)."""
+"""How many threads HexaFix's own pools use, and what only one thread may use at a time.
+
+The number is one setting, and no result depends on it (H57).
+"""
 
 from __future__ import annotations
 
 import os
+import threading
 
 from hexafix.errors import InputError
 
 VARIABLE = "HEXAFIX_THREADS"
 """Environment variable with the number of threads."""
+
+PDFIUM = threading.RLock()
+"""To be held while PDFium works: it knows no threads, and a workstation shows pages while the next
+prescription is read back."""
 
 DEFAULT = 2
 MOST = 64

@@ -3,6 +3,7 @@
 import io
 import json
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from hexafix.case import case_from_document, partial_case
 from hexafix.errors import InputError, LayoutRejected, MarkersNotFound, MissingLibrary
 from hexafix.report.picture import SceneRenderer
 from hexafix.report.surgeon import ring_table
+from hexafix.threads import PDFIUM
 from hexafix.verify import verify_export
 from pypdf import PdfReader
 
@@ -204,3 +206,17 @@ def test_without_the_library_the_pages_say_what_to_install(monkeypatch):
     with pytest.raises(MissingLibrary) as error:
         pipeline.prescription_pages(b"%PDF-")
     assert "pypdfium2" in str(error.value)
+
+
+def test_pages_wait_while_another_thread_reads_a_pdf(prescription):
+    pdf, pages = prescription.files["prescription.pdf"], []
+    drawing = threading.Thread(
+        target=lambda: pages.extend(pipeline.prescription_pages(pdf, dpi=20.0))
+    )
+    with PDFIUM:
+        drawing.start()
+        drawing.join(0.3)
+        assert pages == []
+        assert drawing.is_alive()
+    drawing.join()
+    assert pages

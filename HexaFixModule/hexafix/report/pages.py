@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.errors import InputError, MissingLibrary
+from hexafix.threads import PDFIUM
 
 DPI_RANGE = 20.0, 400.0
 """Resolutions that a screen can need; more would only fill the memory."""
@@ -47,7 +48,7 @@ def pdf_pages(pdf: bytes, *, dpi: float = 110.0) -> list[bytes]:
             next_step="install pypdfium2, or open the PDF in another program",
         ) from error
     try:
-        with pypdfium2.PdfDocument(pdf) as document:
+        with PDFIUM, pypdfium2.PdfDocument(pdf) as document:
             return [_png(_drawn(page, dpi)) for page in document]
     except pypdfium2.PdfiumError as error:
         raise InputError.of("not-a-pdf", "the pages cannot be drawn: this is no PDF") from error

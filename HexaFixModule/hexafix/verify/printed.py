@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hexafix.report.printed import printed_rows, rows_missing
+from hexafix.threads import PDFIUM
 
 TURN = re.compile(r"(\d+) of (\d+)\s+" + r"\s+".join([r"(-?\d+(?:\.\d+)?)\s+\S+"] * 6))
 """One row of the patient's table in the PDF's text: adjustment, count, six values with arrows."""
@@ -66,7 +67,7 @@ def _pdf_differences(document: dict[str, Any], content: bytes) -> list[str]:
     import pypdfium2
 
     try:
-        with pypdfium2.PdfDocument(content) as pdf:
+        with PDFIUM, pypdfium2.PdfDocument(content) as pdf:
             pages = [page.get_textpage().get_text_range() for page in pdf]
     except pypdfium2.PdfiumError as error:
         return [f"prescription.pdf: cannot be read back ({error})"]
