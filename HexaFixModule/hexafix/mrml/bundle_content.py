@@ -7,7 +7,7 @@ reader, shapes, points, transforms and the scene itself number by number (H49, H
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 from xml.parsers import expat
@@ -67,21 +67,27 @@ def check_content(folder: Path, files: Iterable[PurePosixPath]) -> None:
     scenes = [path for path in files if path.name == SCENE_FILE]
     if len(scenes) != 1 or len(scenes[0].parts) > 2:
         faults.append(_fault("bundle-damaged", "the bundle holds no scene, or several", "H49"))
-    for path in files:
-        check = _check_of(path)
-        if check is None:
-            faults.append(_fault("bundle-foreign-file", "a file is of no kind of ours", "H49"))
-            continue
-        try:
-            check(folder / path)
-        except HexaFixError as error:
-            faults += error.faults
-        except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, AttributeError):
-            faults.append(_fault("bundle-damaged", f"a {_kind(path)} file is damaged", "H49"))
     if len(scenes) == 1:
         faults += _scene_faults(folder / scenes[0], scenes[0].parent, set(files))
+    # The image last, and only if all else is sound: reading it takes the longest.
+    for path in sorted(files, key=lambda path: _kind(path) == ".nrrd"):
+        if _kind(path) != ".nrrd" or not faults:
+            faults += _file_faults(folder, path)
     if faults:
         raise Refused(*dict.fromkeys(faults))
+
+
+def _file_faults(folder: Path, path: PurePosixPath) -> Sequence[Fault]:
+    check = _check_of(path)
+    if check is None:
+        return [_fault("bundle-foreign-file", "a file is of no kind of ours", "H49")]
+    try:
+        check(folder / path)
+    except HexaFixError as error:
+        return error.faults
+    except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, AttributeError):
+        return [_fault("bundle-damaged", f"a {_kind(path)} file is damaged", "H49")]
+    return []
 
 
 def _kind(path: PurePosixPath) -> str:

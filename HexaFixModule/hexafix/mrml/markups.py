@@ -23,6 +23,9 @@ ROWS = f"{PREFIX}rows"
 BALL_INDEX = f"{PREFIX}ball_index"
 """JSON: control point id to index among the balls found."""
 
+STILL_MM = 1e-6
+"""A point that is nearer to its old place was not dragged, but rounded by a file."""
+
 LISTS = {
     "proximal": "Balls of the proximal ring",
     "distal": "Balls of the distal ring",
@@ -193,7 +196,7 @@ def _as_given(node: Any, points: Sequence[Point]) -> bool:
     if node.GetNumberOfControlPoints() != len(points):
         return False
     given = np.array([point.position_lps_mm for point in points], float).reshape(-1, 3)
-    return bool(np.array_equal(positions_lps_mm(node), given))
+    return bool(np.allclose(positions_lps_mm(node), given, rtol=0.0, atol=STILL_MM))
 
 
 def moved_balls(node: Any) -> dict[int, list[float]]:
@@ -204,9 +207,13 @@ def moved_balls(node: Any) -> dict[int, list[float]]:
     for at, now in enumerate(positions_lps_mm(node)):
         index = indices.get(node.GetNthControlPointID(at))
         before = next((row[0] for row in given if row[3] == index), None)
-        if index is not None and before is not None and not np.array_equal(now, before):
+        if index is not None and before is not None and _apart(now, before):
             moved[index] = now.tolist()
     return moved
+
+
+def _apart(now: NDArray[np.float64], before: Sequence[float]) -> bool:
+    return bool(np.abs(now - np.asarray(before, float)).max() > STILL_MM)
 
 
 def removed_balls(node: Any) -> list[int]:

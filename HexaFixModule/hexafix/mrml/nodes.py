@@ -79,9 +79,14 @@ def ensure_displayed(scene: Any, class_name: str, role: str, name: str) -> tuple
     return node, node.GetDisplayNode()
 
 
-def remove(scene: Any, prefix: str, *, keep: frozenset[str] = frozenset()) -> None:
-    """Remove the nodes of a role and below it, with what displays and stores them."""
-    for node in [n for n in nodes_of(scene, prefix) if n.GetAttribute(ROLE) not in keep]:
+def remove(scene: Any, prefix: str) -> None:
+    """Remove the nodes of a role and below it, with what displays, stores and lists them."""
+    tree = scene.GetFirstNodeByClass("vtkMRMLSubjectHierarchyNode")
+    for node in list(nodes_of(scene, prefix)):
+        item = tree.GetItemByDataNode(node) if tree is not None else 0
+        if item:
+            # Its item first: the tree looks its nodes up by address.
+            tree.RemoveItem(item, False, False)
         for part in parts_of(node):
             scene.RemoveNode(part)
         scene.RemoveNode(node)

@@ -14,7 +14,7 @@ from hexafix.mrml.parameter_node import ROLE_OF_PARAMETERS, copy_parameters, par
 ATTRIBUTES = ("ModuleName",)
 """Attributes that go along besides our own."""
 
-STORAGE = "storage"
+DISPLAY, STORAGE = "display", "storage"
 
 
 def copy_nodes(source: Any, target: Any) -> dict[str, Any]:
@@ -32,27 +32,26 @@ def copy_nodes(source: Any, target: Any) -> dict[str, Any]:
     pairs: dict[str, Any] = {}
     made: dict[str, Any] = {}
     nodes = list(nodes_of(source))
+    displays = [part for node in nodes for part in parts_of(node) if part.IsA("vtkMRMLDisplayNode")]
+    for part in displays:
+        pairs[part.GetID()] = target.AddNode(_twin(part, part.GetNodeTagName()))
     for node in nodes:
         role = node.GetAttribute(ROLE)
         if role == ROLE_OF_PARAMETERS:
             twin = parameter_node(target)
         else:
             twin = _twin(node, node.GetAttribute(NAME) or node.GetNodeTagName())
+            # Before it is added: a scene gives a node without display one of its own.
+            for part in parts_of(node):
+                if part.GetID() in pairs:
+                    twin.AddNodeReferenceID(DISPLAY, pairs[part.GetID()].GetID())
             target.AddNode(twin)
         pairs[node.GetID()], made[role] = twin, twin
-        for part in parts_of(node):
-            if part.IsA("vtkMRMLDisplayNode"):
-                copy = _twin(part, part.GetNodeTagName())
-                target.AddNode(copy)
-                pairs[part.GetID()] = copy
+    for node in [*displays, *nodes]:
+        _refer(node, pairs[node.GetID()], pairs, target)
     for node in nodes:
-        twin = pairs[node.GetID()]
-        _refer(node, twin, pairs, target)
-        for part in parts_of(node):
-            if part.GetID() in pairs:
-                _refer(part, pairs[part.GetID()], pairs, target)
         if node.GetAttribute(ROLE) == ROLE_OF_PARAMETERS:
-            copy_parameters(node, twin)
+            copy_parameters(node, pairs[node.GetID()])
     return made
 
 
