@@ -86,13 +86,16 @@ class QtWidgets:
             signal = SIGNALS[event]
         values: dict[str, Callable[..., Any]] = {
             "clicked": lambda *_: None,
+            "checked": lambda *_: self.get(name, "checked"),
+            "picked": lambda *_: self.get(name, "index"),
+            "moved": lambda *_: self.get(name, "value"),
             "edited": lambda *_: self.get(name, "text"),
             "row": lambda *_: self.get(name, "index"),
             "cell": lambda *_: None,
             "dated": lambda *_: self.get(name, "date"),
             "link": lambda url: str(url.toString()),
         }
-        value = values.get(event, lambda given: given)
+        value = values[event]
         self.attach(widget, signal, lambda *given: callback(value(*given)))
 
     def every(self, seconds: float, callback: Callable[[], None] | None) -> None:

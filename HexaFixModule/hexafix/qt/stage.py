@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from hexafix.panel import Panel
@@ -68,6 +68,7 @@ class Stage:
         self._row: int | None = None
         self.point: Point = (0.0, 0.0, 0.0)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="hexafix-surface")
+        self._cutting: Future[None] | None = None
         self._closed = False
         self.grey = vtkImageProperty()
         self.grey.SetInterpolationTypeToLinear()
@@ -204,7 +205,12 @@ class Stage:
             if not self._closed:
                 self._post(lambda: self._bones_made(recognised, made))
 
-        self._worker.submit(work)
+        self._cutting = self._worker.submit(work)
+
+    @property
+    def working(self) -> bool:
+        """Whether the bone's surface is being cut."""
+        return self._cutting is not None and not self._cutting.done()
 
     def _bones_made(self, recognised: Any, made: dict[str, Outline]) -> None:
         if not self._closed and self.presenter.value(Step.POSES) is recognised:
@@ -285,9 +291,11 @@ class Stage:
         shown = (Step.CORRECTION, Step.SCHEDULE)
         if preview is None or self.presenter.snapshot.current not in shown:
             return None
-        if not self.presenter.is_fresh(Step.CORRECTION) or not preview.get("fragment_lps"):
+        # What is asked for, not what the frame makes of it: the user drags this very motion.
+        asked = preview.get("asked_lps") or preview.get("fragment_lps")
+        if asked is None or not self.presenter.is_fresh(Step.CORRECTION):
             return None
-        return preview["fragment_lps"], str(preview["moving"])
+        return asked, str(preview["moving"])
 
     def render(self) -> None:
         """Draw all views now."""

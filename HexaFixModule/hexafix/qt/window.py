@@ -140,15 +140,13 @@ class Window:
             self.actions[key].setEnabled(possible)
             word = key.capitalize()
             self.actions[key].setText(f"&{word} {label}" if label else f"&{word}")
-        recent = self.recent()
-        self.actions["recent"].setEnabled(bool(recent))
-        self.actions["recent"].setText(
-            f"Open &recent: {Path(recent).parent.name}/{Path(recent).name}"
-            if recent
-            else "Open &recent"
-        )
-        if snapshot.case_path and snapshot.case_path != recent:
+        if snapshot.case_path and snapshot.case_path != self.recent():
             self.settings.setValue(RECENT, snapshot.case_path)
+        recent = Path(self.recent())
+        known = bool(self.recent())
+        self.actions["recent"].setEnabled(known)
+        where = f": {recent.parent.name}/{recent.name}" if known else ""
+        self.actions["recent"].setText(f"Open &recent{where}")
         self.main.statusBar().showMessage(
             "Ready for the export." if snapshot.can_export else snapshot.export_blocked_by
         )
