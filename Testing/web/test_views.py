@@ -246,6 +246,24 @@ def test_both_of_two_clicks_add_a_marker_where_they_were(
     assert not a_workstation.state.views_hint
 
 
+def test_a_ball_dragged_in_a_slice_is_moved_in_the_case(
+    a_workstation, a_view, balls, run, monkeypatch
+):
+    moved = []
+    monkeypatch.setattr(
+        a_workstation.presenter, "move_marker", lambda index, lps: moved.append((index, lps))
+    )
+    run(lambda: a_workstation.views.select_ball(4))
+    view = a_view("Red")
+    x, y, _ = pixel_of(view, balls[4])
+    run(lambda: press(view, x, y, then=(x + 12, y)))
+    spacing = view.get_view_node().GetFieldOfView()[0] / SIZE[0]
+    ((index, place),) = moved
+    assert index == 4
+    # To the right on an axial screen: to the patient's left.
+    assert np.array(place) - balls[4] == pytest.approx([12 * spacing, 0, 0], abs=1.5 * spacing)
+
+
 def test_a_point_that_is_asked_for_is_given_once(a_workstation, a_view, run):
     given = []
     views = a_workstation.views

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -59,13 +60,21 @@ def serve(
 
     def ready(url: str) -> None:
         print(url, flush=True)
-        if not no_browser:
+        if not no_browser and has_screen():
+            import threading
             import webbrowser
 
-            webbrowser.open(url)
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
     run(case, allowed, ready=ready)
     return 0
+
+
+def has_screen() -> bool:
+    """Whether a browser would open in a window: one in the terminal would hold the server up."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _measure(case: Path | None) -> int:

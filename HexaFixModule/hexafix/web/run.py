@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import os
 import signal
 import sys
@@ -23,7 +24,18 @@ def prepare_environment() -> None:
     for name in [n for n in os.environ if n.startswith(("TRAME_", "WSLINK_"))]:
         del os.environ[name]
     os.environ["TRAME_ARGS"] = ""
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+    draw_without_screen()
+
+
+def draw_without_screen() -> None:
+    """Have VTK draw in memory if Mesa can; a choice made in the environment stays."""
+    if not sys.platform.startswith("linux") or "VTK_DEFAULT_OPENGL_WINDOW" in os.environ:
+        return
+    for name in ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"):
+        with suppress(OSError):
+            ctypes.CDLL(name)
+            os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkOSOpenGLRenderWindow"
+            return
 
 
 def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> None:

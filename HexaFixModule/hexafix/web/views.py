@@ -65,7 +65,7 @@ class Views:
         self._placing = self._dragging_fragment = False
         self._volume: Any = None
         self._framed = False
-        self._state.update({"views_layout": FOUR, "views_hint": ""})
+        self._state.update({"views_layout": FOUR, "views_hint": "", "views_loaded": False})
         self.window = WindowLevel(server)
         register_factories(app.view_manager, server)
         self._layouts = LayoutManager(app.scene, app.view_manager, server)
@@ -92,6 +92,12 @@ class Views:
             build_bar(self, self._state)
             with html.Div(style=whole, classes=("views_hint ? 'hx-aim' : ''",)):
                 self._layouts.initialize_layout_grid(page)
+                html.Div(
+                    "No CT is loaded",
+                    v_if="!views_loaded",
+                    classes="hx-note",
+                    raw_attrs=["role=note"],
+                )
 
     def set_layout(self, name: str) -> None:
         """Show one of `layouts.NAMES`."""
@@ -215,6 +221,8 @@ class Views:
     def _show_volume(self, volume: Any) -> None:
         """The CT in all slice views, whole, at the suggested window; or none."""
         self.window.let_go()
+        with self._state:
+            self._state.views_loaded = volume is not None
         if volume is None:
             return
         node: Any = self._logic.volume_node()
