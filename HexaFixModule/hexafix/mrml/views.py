@@ -99,7 +99,7 @@ class OffscreenView:
         actor = vtkActor2D()
         actor.SetMapper(self._mapper)
         actor.GetProperty().SetDisplayLocationToBackground()
-        self.renderer.AddActor2D(actor)
+        self.renderer.AddViewProp(actor)
 
     def show_slice(self, volume_node: Any, center_lps_mm: ArrayLike) -> None:
         """Show the slice of a volume through a point, LPS mm (slice views only)."""
