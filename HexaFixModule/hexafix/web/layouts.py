@@ -27,24 +27,24 @@ EDGES = ("left", "right", "top", "bottom")
 
 STYLE = """
 html { overflow: hidden; }
-.hx-views-bar { display: flex; align-items: center; gap: 10px; padding: 6px 10px;
+.hxv-views-bar { display: flex; align-items: center; gap: 10px; padding: 6px 10px;
   flex-wrap: wrap; }
-.hx-gap { width: 6px; }
-.hx-hint { color: #ffe082; font-weight: 600; }
-.hx-aim, .hx-aim * { cursor: crosshair !important; }
-.hx-over { position: absolute; pointer-events: none; color: #ffffff; user-select: none;
+.hxv-gap { width: 6px; }
+.hxv-hint { color: #ffe082; font-weight: 600; }
+.hxv-aim, .hxv-aim * { cursor: crosshair !important; }
+.hxv-over { position: absolute; pointer-events: none; color: #ffffff; user-select: none;
   text-shadow: 0 0 3px #000, 0 0 3px #000; font-size: 14px; line-height: 1.25; }
-.hx-whole { position: absolute; inset: 0; pointer-events: none; }
-.hx-name { top: 6px; left: 10px; font-weight: 600; }
-.hx-position { top: 24px; left: 10px; font-variant-numeric: tabular-nums; }
-.hx-edge { font-size: 18px; font-weight: 700; color: #ffe082; }
-.hx-left { left: 8px; top: 50%; transform: translateY(-50%); }
-.hx-right { right: 8px; top: 50%; transform: translateY(-50%); }
-.hx-top { top: 4px; left: 50%; transform: translateX(-50%); }
-.hx-bottom { bottom: 34px; left: 50%; transform: translateX(-50%); }
-.hx-slider { position: absolute; bottom: 0; left: 8px; right: 8px; }
-.hx-reset { position: absolute; top: 2px; right: 2px; }
-.hx-note { position: absolute; top: 50%; left: 0; right: 0; text-align: center; color: #bdbdbd;
+.hxv-whole { position: absolute; inset: 0; pointer-events: none; }
+.hxv-name { top: 6px; left: 10px; font-weight: 600; }
+.hxv-position { top: 24px; left: 10px; font-variant-numeric: tabular-nums; }
+.hxv-edge { font-size: 18px; font-weight: 700; color: #ffe082; }
+.hxv-left { left: 8px; top: 50%; transform: translateY(-50%); }
+.hxv-right { right: 8px; top: 50%; transform: translateY(-50%); }
+.hxv-top { top: 4px; left: 50%; transform: translateX(-50%); }
+.hxv-bottom { bottom: 34px; left: 50%; transform: translateX(-50%); }
+.hxv-slider { position: absolute; bottom: 0; left: 8px; right: 8px; }
+.hxv-reset { position: absolute; top: 2px; right: 2px; }
+.hxv-note { position: absolute; top: 50%; left: 0; right: 0; text-align: center; color: #bdbdbd;
   pointer-events: none; font-size: 16px; }
 """
 """Style of what lies over the views; white on a dark rim is legible on bone and on air."""
@@ -85,17 +85,17 @@ def over_slice(server: Any, view_id: str, view: Any) -> None:
     name_over(view)
     html.Div(
         f"{{{{ {state_name(view_id, 'position')} }}}}",
-        classes="hx-over hx-position",
+        classes="hxv-over hxv-position",
         raw_attrs=[f'data-testid="{view_id}-position"'],
     )
     for edge in EDGES:
         html.Div(
             f"{{{{ {state_name(view_id, edge)} }}}}",
-            classes=f"hx-over hx-edge hx-{edge}",
+            classes=f"hxv-over hxv-edge hxv-{edge}",
             raw_attrs=[f'data-testid="{view_id}-{edge}"'],
         )
     reset_button(view)
-    with html.Div(classes="hx-slider"):
+    with html.Div(classes="hxv-slider"):
         Slider(typed_state=connect_slice_view_slider_to_state(server, view), density="compact")
     follow_slice(server, view_id, view)
 
@@ -126,8 +126,8 @@ def name_over(view: Any) -> None:
     from trame.widgets import html
 
     tag = view.get_singleton_tag()
-    html.Div(classes="hx-whole", raw_attrs=[f'data-testid="over-{tag}"'])
-    html.Div(VIEW_NAMES[tag], classes="hx-over hx-name")
+    html.Div(classes="hxv-whole", raw_attrs=[f'data-testid="over-{tag}"'])
+    html.Div(VIEW_NAMES[tag], classes="hxv-over hxv-name")
 
 
 def reset_button(view: Any) -> None:
@@ -135,7 +135,7 @@ def reset_button(view: Any) -> None:
     from trame.widgets import html
     from trame.widgets import vuetify3 as v3
 
-    with html.Div(classes="hx-reset"):
+    with html.Div(classes="hxv-reset"):
         v3.VBtn(
             icon="mdi-fit-to-screen-outline",
             title="Show all",

@@ -90,12 +90,12 @@ class Views:
             raw_attrs=['data-testid="views"', 'aria-label="Views of CT and frame"'],
         ):
             build_bar(self, self._state)
-            with html.Div(style=whole, classes=("views_hint ? 'hx-aim' : ''",)):
+            with html.Div(style=whole, classes=("views_hint ? 'hxv-aim' : ''",)):
                 self._layouts.initialize_layout_grid(page)
                 html.Div(
                     "No CT is loaded",
                     v_if="!views_loaded",
-                    classes="hx-note",
+                    classes="hxv-note",
                     raw_attrs=["role=note"],
                 )
 

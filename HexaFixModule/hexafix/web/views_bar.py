@@ -23,11 +23,11 @@ def build_bar(views: Views, state: Any) -> None:
     """
     from trame.widgets import html
 
-    with html.Div(classes="hx-views-bar", raw_attrs=['data-testid="views-bar"']):
+    with html.Div(classes="hxv-views-bar", raw_attrs=['data-testid="views-bar"']):
         _layout_menu()
         _grey_values()
         _shown()
-        html.Div("{{ views_hint }}", classes="hx-hint", raw_attrs=['role="status"'])
+        html.Div("{{ views_hint }}", classes="hxv-hint", raw_attrs=['role="status"'])
     _connect(views, state)
 
 
@@ -79,7 +79,7 @@ def _grey_values() -> None:
         raw_attrs=['aria-label="Drag in a slice to change the grey values"'],
     ):
         pass
-    html.Span(classes="hx-gap")
+    html.Span(classes="hxv-gap")
 
 
 def _shown() -> None:
