@@ -249,7 +249,10 @@ class Core:
             found = self.result(step)
             if found is not None and found.value is not None:
                 self.results.show(found)
-        self._snapshot = view.snapshot_of(self)
+        try:
+            self._snapshot = view.snapshot_of(self)
+        except Exception as error:
+            self._snapshot = view.without_content(self._snapshot, error, busy=self.job is not None)
         self.changed.emit(self._snapshot)
 
     def _live(self) -> None:

@@ -99,9 +99,15 @@ def reading_differs(strut: int, first: float | None, second: float | None) -> Fa
     return Fault(
         "reading-not-repeated",
         f"the two readings of strut {strut} differ",
-        value=f"{second} mm",
-        limit=f"{first} mm",
+        value=_reading(second),
+        limit=_reading(first),
         hazard="H24",
         where=f"strut_readings_mm[{strut - 1}]",
         next_step=f"read strut {strut} on the frame once more and correct the wrong entry",
     )
+
+
+def _reading(value: object) -> str:
+    from hexafix.pipeline import format_mm
+
+    return f"{format_mm(value)} mm" if isinstance(value, int | float) else "none"

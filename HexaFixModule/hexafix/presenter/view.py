@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hexafix.errors import Fault
 from hexafix.presenter import notices, tables
+from hexafix.presenter.compute import defect
 from hexafix.presenter.inputs import ORDER, is_missing
 from hexafix.presenter.results import Result
 from hexafix.presenter.state import TITLES, Banner, Snapshot, Step, StepState, StepView, Table
@@ -60,6 +61,21 @@ def snapshot_of(core: Core) -> Snapshot:
     )
 
 
+def without_content(before: Snapshot, error: Exception, *, busy: bool) -> Snapshot:
+    """What is shown where a defect keeps the present state from being shown: no export of it."""
+    fault = defect(error)
+    return replace(
+        before,
+        busy=busy,
+        progress=None,
+        banners=(notices.banner(fault, kind="error"),),
+        tables=MappingProxyType(dict.fromkeys(TABLES, Table(()))),
+        can_export=False,
+        export_blocked_by=fault.what,
+        export_folder=None,
+    )
+
+
 # ---------------------------------------------------------------- steps
 
 
@@ -71,10 +87,18 @@ def _step(core: Core, step: Step) -> StepView:
     if found is not None:
         faults = (*faults, *found.faults)
     summary = SUMMARIES[state]
-    if state == StepState.REFUSED or (state == StepState.WAITING and (faults or missing)):
-        first = (faults or missing)[0]
-        summary = first.next_step if is_missing(first) and first.next_step else first.what
+    if state in (StepState.REFUSED, StepState.WAITING):
+        wrong = found.faults if found is not None else ()
+        summary = _first_words([*wrong, *(f for f in missing if f in faults), *missing]) or summary
     return StepView(step, TITLES[step], state, summary, faults)
+
+
+def _first_words(faults: list[Fault]) -> str:
+    """What is wrong first, or what is to be done where something is only missing."""
+    if not faults:
+        return ""
+    first = faults[0]
+    return first.next_step if is_missing(first) and first.next_step else first.what
 
 
 def _state(core: Core, step: Step, found: Result | None, missing: tuple[Fault, ...]) -> StepState:

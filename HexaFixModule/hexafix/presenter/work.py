@@ -14,7 +14,6 @@ from hexafix.presenter.core import Core, action
 from hexafix.presenter.inputs import ORDER, Inputs
 from hexafix.presenter.results import Result
 from hexafix.presenter.state import Step
-from hexafix.presenter.view import export_blocked_by
 from hexafix.presenter.worker import Job, cancelled
 
 POLL_S = 0.002
@@ -76,7 +75,8 @@ class Work(Core):
     def export(self, folder: str | Path) -> None:
         """Write the prescription shown as an export folder, all or nothing."""
         self.look_again()
-        blocked, result = export_blocked_by(self), self.result(Step.EXPORT)
+        self.refresh()
+        blocked, result = self.snapshot.export_blocked_by, self.result(Step.EXPORT)
         if blocked or result is None:
             raise Refused.of(
                 "export-blocked",

@@ -80,10 +80,10 @@ class Job:
         self.check()
         self._report(step, fraction)
 
-    def join(self, timeout_s: float = JOIN_S) -> bool:
-        """Wait for the end; False if it did not come."""
+    def join(self) -> bool:
+        """Wait for the end, at most `JOIN_S`; False if it did not come."""
         if self._thread is not threading.current_thread() and self._thread.is_alive():
-            self._thread.join(timeout_s)
+            self._thread.join(JOIN_S)
         return not self._thread.is_alive()
 
     def _run(self) -> None:
