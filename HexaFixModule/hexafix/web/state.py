@@ -160,7 +160,7 @@ def _step_words(view: Any) -> dict[str, Any]:
         "color": color,
         "icon": icon,
         "summary": view.summary,
-        "faults": [fault.message for fault in view.faults],
+        "faults": [fault.next_step or fault.message for fault in view.faults],
     }
 
 

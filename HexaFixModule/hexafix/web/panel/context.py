@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -63,6 +63,15 @@ class PanelContext:
             banners = self.presenter.snapshot.banners
             words = f"not taken: {banners[0].message}" if banners else "not taken"
             self.data.field_errors = {**self.data.field_errors, field: words}
+
+    def ask_point(self, picked: Callable[[Sequence[float]], None]) -> None:
+        """Hand the next point that is clicked in a view (LPS, mm) to `picked`."""
+
+        def taken(lps: Sequence[float]) -> None:
+            with self.server.state:
+                picked(lps)
+
+        self.controls.pick_point(taken)
 
     def tell(self, error: HexaFixError, *, field: str | None = None) -> None:
         """Show an error: the text of a field stays, marked as not taken."""

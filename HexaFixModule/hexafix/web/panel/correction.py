@@ -278,7 +278,7 @@ class CorrectionStep:
             self._data.draft = {**self._data.draft, key: point_words(lps)}
             self.stop()
 
-        self._context.controls.pick_point(picked)
+        self._context.ask_point(picked)
 
 
 def point_words(point: Sequence[float]) -> list[str]:

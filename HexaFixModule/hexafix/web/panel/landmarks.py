@@ -172,7 +172,7 @@ class Landmarks:
             self._context.controls.pick_point(None)
             self._show()
 
-        self._context.controls.pick_point(picked)
+        self._context.ask_point(picked)
 
 
 def _words(point: Sequence[float] | None) -> str:

@@ -155,7 +155,7 @@ class MarkersStep:
             self.stop()
             self._context.act(lambda: self._context.presenter.move_marker(index, lps))
 
-        self._context.controls.pick_point(picked)
+        self._context.ask_point(picked)
 
     def _remove(self, index: int) -> None:
         self._context.act(lambda: self._context.presenter.remove_marker(index))

@@ -52,7 +52,7 @@ class PosesStep:
                     f"Rose of the {ring} ring's markers with their included angles",
                     f"rose-{ring}",
                 )
-        table(context, "layout", "Verdict on the layout")
+        table(context, "layout", "Verdict on the layout", hidden=("Included angles deg",))
         v.VSwitch(
             label="Accept a layout that meets only the relaxed rule (recorded in the plan)",
             model_value=(f"{name.confirmed}.relaxed_layout",),
