@@ -128,6 +128,21 @@ class LayoutManager:
 
     def __init__(self, slices):
         self._slices, self._threed = slices, ThreeDWidget()
+        self._slots = []
+
+    def connect(self, signal, slot):
+        assert signal == "layoutChanged(int)"
+        self._slots.append(slot)
+
+    def disconnect(self, signal, slot):
+        assert signal == "layoutChanged(int)"
+        self._slots.remove(slot)
+
+    def show_another_slice(self, name, node):
+        """The user chooses a layout with one more view."""
+        self._slices[name] = SliceWidget(node)
+        for slot in tuple(self._slots):
+            slot(3)
 
     def sliceViewNames(self):
         return tuple(self._slices)

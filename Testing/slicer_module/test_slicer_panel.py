@@ -100,6 +100,19 @@ def test_a_click_on_a_ball_chooses_it_and_a_drag_does_not(a_walk):
         assert float(shown) == pytest.approx(wanted, abs=0.51), "half a pixel, LPS"
 
 
+def test_a_view_of_another_layout_is_watched_too_and_none_twice(a_walk):
+    assert a_walk[0]["clicked_in_both"] == [2, 2]
+
+
+def test_where_slicer_has_no_window_there_is_nothing_to_watch():
+    from hexafix.slicer_panel.clicks import SliceClicks
+
+    clicks = SliceClicks(None, print, print)
+    clicks.start()
+    clicks.stop()
+    assert clicks._observers == []
+
+
 def test_choosing_a_ball_brings_all_slices_to_it(a_walk):
     assert max(a_walk[0]["slice_misses"]) < 1e-3
 
@@ -119,6 +132,7 @@ def test_playback_moves_the_ring(a_walk):
 
 def test_after_leaving_the_module_clicks_are_not_ours(a_walk):
     assert a_walk[0]["row_after_exit"] == -1
+    assert a_walk[0]["row_after_return"] == 2
 
 
 def test_a_closed_scene_comes_back_with_the_module(a_walk):

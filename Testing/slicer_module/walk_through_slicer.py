@@ -101,22 +101,41 @@ seen["balls"] = len(presenter.snapshot.tables["balls"].rows)
 slicer_app.events(lambda: not shell._ui._timer.active)
 seen["timer_stops"] = True
 
-# A click on a ball in a slice view through it.
-place = shell.logic.select_ball(2)
-ras = shell.logic.ras_from_lps(place)
 red = slicer.app.layoutManager().sliceWidget("Red")
-node = red.mrmlSliceNode()
-slicer.vtkMRMLSliceNode.JumpAllSlices(slicer.mrmlScene, *ras)
-inverse = vtkMatrix4x4()
-vtkMatrix4x4.Invert(node.GetXYToRAS(), inverse)
-x, y = (round(value) for value in inverse.MultiplyPoint((*ras, 1.0))[:2])
-find("ballsTable").clearSelection()
-red.sliceView().click(x, y, drag=40)
-seen["row_after_drag"] = shell.panel.widgets.get("ballsTable", "index")
+
+
+def pixel_of_ball(index):
+    """Where a ball stands in the axial view through it; no row of the table is chosen."""
+    ras = shell.logic.ras_from_lps(shell.logic.select_ball(index))
+    slicer.vtkMRMLSliceNode.JumpAllSlices(slicer.mrmlScene, *ras)
+    inverse = vtkMatrix4x4()
+    vtkMatrix4x4.Invert(red.mrmlSliceNode().GetXYToRAS(), inverse)
+    find("ballsTable").clearSelection()
+    return [round(value) for value in inverse.MultiplyPoint((*ras, 1.0))[:2]]
+
+
+def chosen_row():
+    return shell.panel.widgets.get("ballsTable", "index")
+
+
+# A click on a ball in a slice view through it, and a drag that ends there.
+x, y = pixel_of_ball(2)
+red.sliceView().click(x - 40, y, drag=40)
+seen["row_after_drag"] = chosen_row()
 red.sliceView().click(x, y)
-seen["row_after_click"] = shell.panel.widgets.get("ballsTable", "index")
+seen["row_after_click"] = chosen_row()
 seen["clicked_place"] = [find(f"marker{axis}LineEdit").text() for axis in "LPS"]
-seen["ball_place"] = list(place)
+seen["ball_place"] = list(shell.logic.select_ball(2))
+
+# A view that comes with another layout is watched too, and none twice.
+clicked = []
+shell.panel.ball_chosen.connect(clicked.append)
+slicer.app.layoutManager().show_another_slice("Slice4", red.mrmlSliceNode())
+find("ballsTable").clearSelection()
+slicer.app.layoutManager().sliceWidget("Slice4").sliceView().click(x, y)
+red.sliceView().click(x, y)
+seen["clicked_in_both"] = clicked
+shell.panel.ball_chosen.disconnect(clicked.append)
 
 # Choosing another ball brings all slices to it.
 find("ballsTable").selectRow(4)
@@ -163,10 +182,12 @@ seen["ring_moves"] = max(abs(a - b) for a, b in zip(start, pose(ring), strict=Tr
 
 # Another module: clicks are not ours.
 widget.exit()
-find("ballsTable").clearSelection()
+x, y = pixel_of_ball(2)
 red.sliceView().click(x, y)
-seen["row_after_exit"] = shell.panel.widgets.get("ballsTable", "index")
+seen["row_after_exit"] = chosen_row()
 widget.enter()
+red.sliceView().click(x, y)
+seen["row_after_return"] = chosen_row()
 
 # The scene is closed and the module entered again: the case is still there and shown.
 slicer.mrmlScene.Clear(0)

@@ -11,6 +11,8 @@ from hexafix.panel.qt_widgets import read
 STILL_PIXELS = 3
 """A mouse that went farther between press and release was dragging."""
 
+LAYOUT_CHANGED = "layoutChanged(int)"
+
 Point = tuple[float, float, float]
 
 
@@ -19,7 +21,8 @@ class SliceClicks:
 
     Parameters
     ----------
-    layout : qSlicerLayoutManager
+    layout : qSlicerLayoutManager or None
+        None where Slicer runs without its main window: then there is nothing to click.
     clicked : callable
         Called with the clicked point, LPS mm.
     released : callable
@@ -32,25 +35,36 @@ class SliceClicks:
         self._layout, self._clicked, self._released = layout, clicked, released
         self._observers: list[tuple[Any, int]] = []
         self._pressed: tuple[int, int] | None = None
+        self._watching = False
 
     def start(self) -> None:
-        """Watch the views that there are now; watching already, begin anew."""
+        """Watch the views of the present layout and of every later one."""
         self.stop()
-        for name in self._layout.sliceViewNames():
-            widget = self._layout.sliceWidget(name)
-            self._watch(widget.sliceView().interactor(), widget.mrmlSliceNode())
-        for index in range(self._threed_views()):
-            view = self._layout.threeDWidget(index).threeDView()
-            self._watch(view.interactor(), None)
+        if self._layout is not None:
+            self._layout.connect(LAYOUT_CHANGED, self._watch_all)
+            self._watching = True
+            self._watch_all()
 
     def stop(self) -> None:
         """Watch no more."""
+        if self._watching:
+            self._layout.disconnect(LAYOUT_CHANGED, self._watch_all)
+            self._watching = False
+        self._forget()
+
+    def _forget(self) -> None:
         for interactor, tag in self._observers:
             interactor.RemoveObserver(tag)
         self._observers.clear()
 
-    def _threed_views(self) -> int:
-        return int(read(self._layout, "threeDViewCount"))
+    def _watch_all(self, *_: Any) -> None:
+        self._forget()
+        for name in self._layout.sliceViewNames():
+            widget = self._layout.sliceWidget(name)
+            self._watch(widget.sliceView().interactor(), widget.mrmlSliceNode())
+        for index in range(int(read(self._layout, "threeDViewCount"))):
+            view = self._layout.threeDWidget(index).threeDView()
+            self._watch(view.interactor(), None)
 
     def _watch(self, interactor: Any, slice_node: Any | None) -> None:
         def press(*_: Any) -> None:
