@@ -205,6 +205,8 @@ class Work(Core):
                     values[step] = found.value
                     continue
                 missing = self.inputs.faults_before(step)
+                if found is not None and not found.faults:
+                    missing = self.inputs.faults_before(target)  # judged, but not complete
                 if found is not None or missing:
                     self.tell(*missing, kind="error", step=step)
                     break
