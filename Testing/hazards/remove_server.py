@@ -14,9 +14,10 @@ import traceback
 
 SLOW_IMPORTS = (
     *("numpy", "scipy.linalg", "scipy.spatial.transform", "scipy.ndimage", "scipy.special"),
-    *("pydicom", "pydantic", "cyclopts", "rich", "pytest", "SimpleITK"),
+    *("pydicom", "pydantic.root_model", "cyclopts", "rich", "pytest", "SimpleITK"),
 )
-"""Libraries only: nothing of HexaFix, which every fork loads from its changed source."""
+"""Libraries only (pydantic by a room that loads all of it, or PySide6's import hook breaks the rest):
+nothing of HexaFix, which every fork loads from its changed source."""
 
 
 def answer(arguments: list[str]) -> dict[str, object]:

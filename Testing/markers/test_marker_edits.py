@@ -72,6 +72,20 @@ def test_a_click_a_ball_away_adds_nothing(edit, found):
     assert fault.where == "marker_edits.added_lps_mm[0]"
 
 
+@pytest.mark.parametrize("off_mm", [5.5, 7.0])
+def test_a_ball_is_not_caught_from_outside_it(workbench, off_mm):
+    """Of two clicks near one ball only that in it means the ball."""
+    bench = workbench()
+    bench.ball((0.0, 0.0, 0.0))
+    volume = bench.volume()
+    edits = MarkerEdits(added_lps_mm=[bench.lps((off_mm, 0.0, 0.0))])
+    with pytest.raises(MarkersNotFound) as error:
+        edited_balls(volume, BallSet(()), edits, ball_diameter_mm=10.0)
+    assert "the nearest round thing lies" in str(error.value)
+    inside = MarkerEdits(added_lps_mm=[bench.lps((4.0, 0.0, 0.0))])
+    assert len(edited_balls(volume, BallSet(()), inside, ball_diameter_mm=10.0).balls) == 1
+
+
 def test_a_marker_dragged_to_where_nothing_is_refuses(edit, found):
     ball = found.balls[2]
     with pytest.raises(MarkersNotFound):

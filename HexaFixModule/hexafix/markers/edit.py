@@ -159,7 +159,8 @@ def _added(
 
 
 def _settled(crop: Crop, point: NDArray[np.float64], radius: float) -> RayFit | None:
-    """The fine fit nearest a point that need not be near the ball's centre."""
+    """The roundest fit about a point that need not be near the ball's centre."""
+    fits = []
     for start in (point, _brightest_about(crop, point, radius)):
         rough = None
         for _ in range(FITS):
@@ -168,9 +169,8 @@ def _settled(crop: Crop, point: NDArray[np.float64], radius: float) -> RayFit | 
                 break
             start = rough.center_mm
         else:
-            if rough is not None:
-                return fine_fit(crop, rough, radius)
-    return None
+            fits.append(None if rough is None else fine_fit(crop, rough, radius))
+    return min((fit for fit in fits if fit is not None), key=lambda fit: fit.rms_mm, default=None)
 
 
 def _brightest_about(crop: Crop, point: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
