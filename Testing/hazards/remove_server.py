@@ -16,7 +16,7 @@ SLOW_IMPORTS = (
     *("numpy", "scipy.linalg", "scipy.spatial.transform", "scipy.ndimage", "scipy.special"),
     *("pydicom", "pydantic.root_model", "cyclopts", "rich", "pytest", "SimpleITK"),
 )
-"""Libraries only (pydantic by a room that loads all of it, or PySide6's import hook breaks the rest):
+"""Libraries only, pydantic by the part that loads all of it (else PySide6's import hook breaks it):
 nothing of HexaFix, which every fork loads from its changed source."""
 
 
