@@ -28,6 +28,9 @@ SIGNALS = {
 ALERT = "⚠ "
 """Before the first cell of a row that needs attention."""
 
+WIDEST_COLUMN = 140
+"""Pixels; a longer text is cut and stands whole in the cell's tip."""
+
 BANNER_HEIGHT = 150
 """Messages higher than this, in pixels, are scrolled."""
 
@@ -178,7 +181,7 @@ class QtWidgets:
     def _set_table(self, widget: Any, table: Table) -> None:
         kept = self._chosen_row(widget)
         widget.setColumnCount(len(table.columns))
-        widget.setHorizontalHeaderLabels(list(table.columns))
+        widget.setHorizontalHeaderLabels([_head(column) for column in table.columns])
         widget.setRowCount(len(table.rows))
         for row, cells in enumerate(table.rows):
             alert = table.alerts[row] if row < len(table.alerts) else ""
@@ -188,6 +191,9 @@ class QtWidgets:
                 self._paint(item, alert=bool(alert), stale=table.stale)
                 widget.setItem(row, column, item)
         widget.resizeColumnsToContents()
+        for column in range(len(table.columns) - 1):
+            if int(widget.columnWidth(column)) > WIDEST_COLUMN:
+                widget.setColumnWidth(column, WIDEST_COLUMN)
         if 0 <= kept < len(table.rows):
             widget.selectRow(kept)
 
@@ -208,7 +214,7 @@ class QtWidgets:
         widget.setHtml(html)
         # As high as the messages, up to the height that the .ui allows.
         document = read(widget, "document")
-        document.setTextWidth(max(200, int(read(widget, "width")) - 24))
+        document.setTextWidth(max(300, int(read(self.root, "width")) - 40))
         wanted = int(read(document, "size").height()) + 8
         widget.setFixedHeight(max(40, min(wanted, BANNER_HEIGHT)))
 
@@ -258,6 +264,14 @@ class QtWidgets:
         box.exec_() if hasattr(box, "exec_") else box.exec()
         clicked = read(box, "clickedButton")
         return buttons.index(clicked) if clicked in buttons else len(answers) - 1
+
+
+def _head(column: str) -> str:
+    """A column's head with its unit below it."""
+    for unit in (" mm", " deg", " °"):
+        if column.endswith(unit):
+            return f"{column.removesuffix(unit)}\n{unit.strip()}"
+    return column
 
 
 def _index_of(widget: Any) -> str:

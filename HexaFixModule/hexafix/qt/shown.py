@@ -28,8 +28,8 @@ Point = tuple[float, float, float]
 BALL_LINE: Colour = (1.0, 0.78, 0.1)
 REJECTED: Colour = (0.93, 0.45, 0.15)
 
-AXIS_MM = 45.0
-"""Length of a ring's axes as drawn."""
+FRONT_MM, UP_MM = 115.0, 45.0
+"""Lengths of a ring's x axis, which reaches its rim at the front, and of its z axis, as drawn."""
 
 RINGS = ("proximal", "distal")
 
@@ -98,9 +98,11 @@ def frame_meshes(scene: Any, *, stale: bool = False) -> Mapping[str, Outline]:
         colour = _colour(ring_colour(ring), stale)
         found[f"ring-{ring}"] = Outline(ring_plate(scene, ring), colour, 0.92)
         found[f"joints-{ring}"] = Outline(joint_spheres(scene, ring), _colour(BALL_COLOUR, stale))
-        arrows = axes(scene.ring_pose(ring), length_mm=AXIS_MM)
-        for name, arrow, own in zip("xyz", arrows, AXIS_COLOURS, strict=True):
-            found[f"axis-{ring}-{name}"] = Outline(arrow, _colour(own, stale))
+        pose = scene.ring_pose(ring)
+        front, _, _ = axes(pose, length_mm=FRONT_MM)
+        _, _, up = axes(pose, length_mm=UP_MM)
+        found[f"front-{ring}"] = Outline(front, _colour(AXIS_COLOURS[0], stale))
+        found[f"up-{ring}"] = Outline(up, _colour(AXIS_COLOURS[2], stale))
     for strut, tube in enumerate(strut_tubes(scene), 1):
         found[f"strut-{strut}"] = Outline(tube, _colour(strut_colour(strut), stale))
     for number, ball in ball_spheres(scene).items():
@@ -117,7 +119,7 @@ def labels_of(scene: Any) -> tuple[tuple[str, Point], ...]:
     """The numbers of balls and struts, and where they are written, LPS mm."""
     balls = [(str(ball.number), _point(ball.center_mm)) for ball in scene.balls]
     struts = enumerate(strut_middles_mm(scene), 1)
-    return (*balls, *((f"strut {strut}", _point(middle)) for strut, middle in struts))
+    return (*balls, *((f"S{strut}", _point(middle)) for strut, middle in struts))
 
 
 def _point(values: Any) -> Point:

@@ -309,22 +309,16 @@ class Stage:
 
     # ------------------------------------------------------------ playback, dragging, clicks
 
-    def _playback(self) -> Any:
-        plan = self.presenter.value(Step.SCHEDULE)
-        if self._new("playback", plan):
-            self._played_plan = self.presenter.playback()
-        return self._played_plan
-
     def _played(self) -> Any:
         """The row shown, on the page of the schedule once the user has moved there."""
-        playback = self._playback()
+        playback = self.presenter.playback() if self._row is not None else None
         on_page = self.presenter.snapshot.current == Step.SCHEDULE
-        if playback is None or self._row is None or self._scene is None or not on_page:
+        if self._row is None or playback is None or self._scene is None or not on_page:
             return None
         return playback.rows[min(self._row, len(playback.rows) - 1)]
 
     def _moving(self) -> str:
-        return self._playback().moving
+        return str(self.presenter.playback().moving)
 
     def show_row(self, row: int) -> None:
         """Show the frame after a row of the schedule."""

@@ -9,6 +9,9 @@ from hexafix.qt.kit import kit, views
 from hexafix.qt.shown import Outline
 
 SKY, FLOOR = "#dfe6ec", "#9fb0bf"
+CLOSER = 1.25
+"""How much nearer than a box about everything."""
+
 INK = (0.08, 0.1, 0.14)
 
 Matrix = Sequence[Sequence[float]]
@@ -80,6 +83,7 @@ class View3D:
         """Look at everything from a direction in LPS."""
         self.plotter.view_vector(vector, viewup=up, render=False)
         self.plotter.reset_camera(render=False)
+        self.plotter.camera.zoom(CLOSER)
         self.render()
 
     # ------------------------------------------------------------ content
@@ -154,7 +158,7 @@ class View3D:
             actor.ForceOpaqueOn()
             actor.PickableOff()
             style = actor.GetTextProperty()
-            style.SetFontSize(20)
+            style.SetFontSize(15 if text.startswith("S") else 20)
             style.BoldOn()
             style.SetColor(*INK)
             style.SetBackgroundColor(1.0, 1.0, 1.0)

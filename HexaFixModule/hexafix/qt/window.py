@@ -15,7 +15,7 @@ from hexafix.qt.stage import WINDOWS, Stage
 NOTICE = "Research software, not a medical device."
 
 SIZE = (1440, 900)
-PANEL_WIDTH = 500
+PANEL_WIDTH = 530
 
 SETTINGS = ("HexaFix", "hexafix")
 RECENT = "recentCase"
