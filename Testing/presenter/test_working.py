@@ -2,7 +2,6 @@
 
 import queue
 import threading
-import time
 
 import pytest
 from hexafix.errors import InputError, Refused
@@ -248,13 +247,17 @@ def test_work_that_cannot_be_stopped_does_not_keep_a_closed_door_alive(
     from hexafix.presenter import worker
 
     monkeypatch.setattr(worker, "JOIN_S", 0.01)
-    let_go = threading.Event()
-    an_engine.read_image = lambda *_, **__: let_go.wait(20)
+    let_go, entered = threading.Event(), threading.Event()
+
+    def deaf(*_, **__):
+        entered.set()
+        let_go.wait(20)
+
+    an_engine.read_image = deaf
     presenter = make_presenter(engine=an_engine)
     presenter.open_case(a_case_file)
     presenter.run(Step.LOAD)
-    while not any(t.name == "hexafix-work" for t in threading.enumerate()):
-        time.sleep(0.001)
+    assert entered.wait(10)
     presenter.close()
     (thread,) = (t for t in threading.enumerate() if t.name == "hexafix-work")
     assert thread.daemon

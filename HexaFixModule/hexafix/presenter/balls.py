@@ -81,7 +81,6 @@ class BallEdits(Edits):
                 "numbers-not-assigned",
                 "neither number stands on a ball",
                 value=f"{a} and {b}",
-                hazard="H19",
                 next_step="assign a number first",
             )
         self._number(f"swap numbers {a} and {b}", {names.get(k, k): at for k, at in before.items()})
