@@ -104,9 +104,12 @@ class Workstation:
         self.views.close()
 
     def _show(self, snapshot: Snapshot) -> None:
-        self.sync.update(snapshot)
-        self.views.update(snapshot)
-        self.panel.update(snapshot)
+        try:
+            self.sync.update(snapshot)
+            self.views.update(snapshot)
+        finally:
+            # what is stale and what blocks the export is told even where the scene fails
+            self.panel.update(snapshot)
 
     def _build_page(self) -> None:
         from trame.ui.vuetify3 import VAppLayout
