@@ -1,8 +1,8 @@
 """The workflow of a workstation, without any toolkit: browser, Qt and Slicer show one `Presenter`.
 
 A door shows `Presenter.snapshot`, a frozen value in which every text is ready to be read, follows
-`Presenter.changed`, and calls the presenter's actions. No door computes, and neither does this room:
-every value comes from `hexafix.pipeline`.
+`Presenter.changed`, and calls the presenter's actions. No door computes, and neither does this
+room: every value comes from `hexafix.pipeline`.
 
 **One document.** All that the user edits is the case document, the JSON of ``case.json``. Each edit
 makes one version of its bytes with a label; undo and redo change the version and nothing else. A
@@ -40,8 +40,8 @@ question, the rings' front confirmed (H22).
 
 **Threads.** Long steps work on one thread of their own; `post` brings each new snapshot to the
 door's thread. Stopping them leaves older results as they are. Actions never raise: they return
-whether they were done, and what was wrong is a banner; a defect is told by its type and place, since
-its text could hold patient data (H51).
+whether they were done, and what was wrong is a banner; a defect is told by its type and place,
+since its text could hold patient data (H51).
 """
 
 from hexafix.presenter.presenter import Presenter
