@@ -343,6 +343,38 @@ def test_what_the_handles_leave_becomes_the_correction_when_they_are_let_go(
     assert json.dumps(presenter.snapshot.document["correction"], default=list) == before
 
 
+def test_the_handle_in_a_slice_drags_the_fragment_within_the_slice(
+    a_workstation, a_view, look, run
+):
+    from hexafix.mrml.nodes import find
+    from hexafix.mrml.screen import jump_to, point_under
+    from hexafix.mrml.transforms import TARGET
+
+    presenter, views = a_workstation.presenter, a_workstation.views
+    run(lambda: views.drag_fragment(True))
+    node = find(a_workstation.logic.scene, TARGET)
+    center = node.GetCenterOfTransformation()
+    view = a_view("Red")
+    before = np.array(a_workstation.logic.fragment_motion_lps())
+    # The handles stand where their centre was moved to.
+    place = (before @ [-center[0], -center[1], center[2], 1.0])[:3]
+    run(lambda: jump_to(view.get_view_node(), place))
+    look("Red")
+    x, y, _ = pixel_of(view, place)
+    place_under = point_under(view.get_view_node(), x, y)
+    run(lambda: press(view, x, y, then=(x + 10, y - 6)))
+    run(lambda: views.drag_fragment(False))
+    correction = presenter.snapshot.document["correction"]
+    matrix = np.array(correction["matrix_lps"]) @ np.linalg.inv(before)
+    # What the image's own slices, a little oblique, have 10 pixels to the right and 6 down.
+    wanted = np.array(point_under(view.get_view_node(), x + 10, y - 6)) - place_under
+    assert matrix[:3, 3] == pytest.approx(wanted, abs=0.02)
+    assert wanted[0] > 5.0
+    assert wanted[1] > 3.0
+    assert matrix[:3, :3] == pytest.approx(np.eye(3))
+    run(presenter.undo)
+
+
 def test_no_picture_is_drawn_while_the_views_are_made(a_loop, monkeypatch):
     from hexafix.web.app import Workstation
     from trame_slicer.views import AbstractView
