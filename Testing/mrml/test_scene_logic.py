@@ -141,8 +141,8 @@ def test_the_front_mark_stands_on_the_rings_x_axis(planned):
         assert node.GetNthControlPointLabel(0) == f"{letter} front"
 
 
-def test_the_target_moves_ghost_and_ring_as_the_plan_moves_the_fragment(planned):
-    motion = np.array(planned.document["correction"]["fragment_motion_lps"]["matrix"])
+def test_the_target_moves_ghost_and_ring_as_the_correction_asks(planned):
+    motion = planned.case.correction.motion.matrix
     np.testing.assert_allclose(planned.logic.fragment_motion_lps(), motion, atol=1e-9)
     bone = find(planned.app.scene, "model/bone/proximal")
     ghost = find(planned.app.scene, "model/target/bone")

@@ -200,7 +200,9 @@ class SceneLogic:
     def show_plan(self, case: Case, plan: Plan) -> None:
         """Show the frame, where the fragment shall end, and the strut schedule as a table."""
         self.show_recognised(case, plan.recognised)
-        self.show_target(plan.motion.motion.matrix, plan.motion.moving)
+        asked = (case.document["correction"] or {}).get("matrix_lps")
+        # Of a fragment motion what was asked for: a bone dragged twice must not creep.
+        self.show_target(asked or plan.motion.motion.matrix, plan.motion.moving)
         self.show_schedule(plan)
         hierarchy.arrange(self.scene, case.case_id)
 

@@ -46,7 +46,7 @@ CLASS = "vtkMRMLMarkupsFiducialNode"
 TEXT_SCALE = 4.5
 """Height of a label, in hundredths of the view."""
 
-GLYPH_MM = 4.0
+GLYPH_MM = 8.0
 """Size of the cross at a ball's centre."""
 
 PAPER = (1.0, 1.0, 1.0)

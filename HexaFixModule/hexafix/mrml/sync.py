@@ -157,9 +157,10 @@ class SceneSync:
         frame = self.presenter.value(Step.POSES)
         if not self._new("target", (preview, frame)):
             return False
-        if preview is None or preview.get("fragment_lps") is None:
+        if preview is None or preview.get("asked_lps") is None:
             return False
-        self.logic.show_target(preview["fragment_lps"], preview["moving"])
+        # What was asked for, not what the frame makes of it: a bone dragged twice must not creep.
+        self.logic.show_target(preview["asked_lps"], preview["moving"])
         return True
 
     def _plan(self) -> bool:
@@ -212,7 +213,7 @@ class SceneSync:
         self._dragging_target = False
         matrix = self.logic.fragment_motion_lps()
         preview = self.presenter.value(Step.CORRECTION)
-        known = None if preview is None else preview.get("fragment_lps")
+        known = None if preview is None else preview.get("asked_lps")
         if known is not None and _near(matrix, known):
             return False
         moving = _moving(self.presenter.snapshot.document)
