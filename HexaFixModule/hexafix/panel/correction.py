@@ -153,7 +153,6 @@ def _size_missing(name: str, word: str) -> Fault:
         "size-missing",
         f"the {name} is {word} without a size",
         next_step="type how much, or take the word back",
-        hazard="H55",
     )
 
 

@@ -109,7 +109,6 @@ def _load_series(panel: Panel, _: Any) -> None:
             "no-series-chosen",
             "no series is chosen",
             next_step="click a row of the list of series, then load it",
-            hazard="H05",
         )
     panel.presenter.load_image(
         Path(panel.image_folder), series_instance_uid=rows[chosen][-1] or None
