@@ -109,12 +109,20 @@ def test_vtk_renders_three_views_with_the_bone(a_scene, a_bone):
     assert all("data:image/png;base64," in view.svg for view in pictures.views)
 
 
+def _mirrored(sample):
+    """The same bone on a left-handed grid."""
+    flip = np.diag([-1.0, 1.0, 1.0, 1.0])
+    flip[0, 3] = sample.hu.shape[2] - 1
+    return BoneSample(np.ascontiguousarray(sample.hu[:, :, ::-1]), sample.ijk_to_lps @ flip)
+
+
+@pytest.mark.parametrize("mirrored", [False, True], ids=["right-handed", "left-handed"])
 def test_the_rendered_bone_and_balls_stand_where_the_view_projects_them(
-    a_scene, a_bone, tmp_path, monkeypatch
+    a_scene, a_bone, tmp_path, monkeypatch, mirrored
 ):
     pytest.importorskip("vtkmodules.vtkRenderingOpenGL2")
     image = pytest.importorskip("PIL.Image")
-    scene = dataclasses.replace(a_scene, bone=a_bone)
+    scene = dataclasses.replace(a_scene, bone=_mirrored(a_bone) if mirrored else a_bone)
     shown = []
     monkeypatch.setattr(picture, "_picture", lambda view, _, png: shown.append((view, png)))
     start_scene_render(scene, time_limit_s=120.0).result()

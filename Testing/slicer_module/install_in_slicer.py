@@ -50,6 +50,7 @@ seen = {
     "asked_before": list(asked),
     "opened_before": opened(),
     "loaded_before": [name for name in heavy if name in sys.modules],
+    "labels": [label.text() for label in unwrap(parent).findChildren(QtWidgets.QLabel)],
     "buttons": [button.text() for button in buttons],
 }
 buttons[0].click()

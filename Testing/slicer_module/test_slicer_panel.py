@@ -173,6 +173,7 @@ def test_missing_packages_are_asked_for_only_when_the_user_wants_it(top):
     assert seen["opened_before"] is False
     assert seen["loaded_before"] == []
     assert len(seen["buttons"]) == 1
+    assert "pydicom>=" in seen["labels"][0]
     needed, requester = seen["asked"][0]
     assert requester == "HexaFix"
     assert any(need.startswith("pydicom>=") for need in needed)
@@ -190,6 +191,21 @@ def test_what_is_asked_for_is_what_pyproject_needs(top):
     project = tomllib.loads((top / "pyproject.toml").read_text())["project"]
     assert list(requirements.stated()) == project["dependencies"]
     assert not any("==" in need for need in requirements.stated())
+
+
+def test_every_widget_of_the_binder_stands_in_the_ui_and_is_one_of_qts_own(top):
+    """A widget class of CTK or MRML would not exist in the stand-alone window."""
+    from xml.etree import ElementTree
+
+    from hexafix.panel import BINDINGS
+    from PySide6 import QtWidgets
+
+    tree = ElementTree.parse(top / "Resources" / "UI" / "HexaFixModule.ui")
+    classes = {widget.get("name"): widget.get("class") for widget in tree.iter("widget")}
+    assert {binding.widget for binding in BINDINGS} <= set(classes)
+    assert len(BINDINGS) > 80
+    assert all(hasattr(QtWidgets, name) for name in classes.values())
+    assert list(tree.iter("customwidget")) == []
 
 
 @pytest.fixture

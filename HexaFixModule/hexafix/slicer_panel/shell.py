@@ -37,19 +37,20 @@ class SlicerPanel:
         self.panel: Any = None
         self._request: Any = None
         self._observers: list[int] = []
-        if requirements.missing():
-            self._ask()
+        needed = requirements.missing()
+        if needed:
+            self._ask(needed)
         else:
             self._open()
 
     # ------------------------------------------------------------ what is needed
 
-    def _ask(self) -> None:
-        """A text and a button, in the place of the panel."""
+    def _ask(self, needed: tuple[str, ...]) -> None:
+        """What is missing and a button, in the place of the panel."""
         qt = host.qt()
         self._request = qt.QWidget()
         column = qt.QVBoxLayout(self._request)
-        text = qt.QLabel(ASK_TO_INSTALL)
+        text = qt.QLabel("\n\n".join([ASK_TO_INSTALL, ", ".join(needed)]))
         text.setWordWrap(True)
         self._install = qt.QPushButton("Install what HexaFix needs…")
         column.addWidget(text)
