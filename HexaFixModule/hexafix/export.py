@@ -17,6 +17,7 @@ import json
 import os
 import shutil
 import socket
+import stat
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -79,6 +80,8 @@ def write_export(files: Mapping[str, bytes], folder: Path, *, private: bool = Fa
 def replace_file(path: Path, content: bytes) -> None:
     """Put one file in place, all or nothing, with an export's care; an older one is replaced.
 
+    Who may read it stays as it was.
+
     Raises
     ------
     InputError
@@ -88,6 +91,8 @@ def replace_file(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with _only_writer(path):
+            for leftover in path.parent.glob(f".{glob.escape(path.name)}.staging-*"):
+                leftover.unlink(missing_ok=True)
             descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.staging-", dir=path.parent)
             staging = Path(name)
             try:
@@ -95,7 +100,8 @@ def replace_file(path: Path, content: bytes) -> None:
                     file.write(content)
                     file.flush()
                     os.fsync(file.fileno())
-                staging.chmod(0o666 & ~_umask())
+                mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
+                staging.chmod(stat.S_IMODE(mode))
                 staging.replace(path)
                 _sync_folder(path.parent)
             finally:

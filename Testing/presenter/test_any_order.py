@@ -291,8 +291,8 @@ def test_no_order_of_edits_undo_and_work_leaves_a_stale_result_marked_fresh(mach
     run_state_machine_as_test(
         machine,
         settings=settings(
-            max_examples=25,
-            stateful_step_count=30,
+            max_examples=20,
+            stateful_step_count=25,
             deadline=None,
             derandomize=True,
             suppress_health_check=list(HealthCheck),

@@ -144,3 +144,20 @@ def test_a_new_case_asks_for_the_rings_front(make_presenter, an_engine):
     confirmed = make_presenter(engine=an_engine).snapshot.confirmed
     assert confirmed["ring_front_needed"]
     assert not confirmed["ring_front"]
+
+
+def test_a_doubtful_reading_is_a_warning_with_its_strut(a_planned, an_engine, monkeypatch):
+    good = an_engine.weigh_document
+
+    def doubtful(case, recognised):
+        document = good(case, recognised)
+        document["struts"][2] |= {"difference_mm": -1.25, "verdict": "read-again"}
+        return document
+
+    monkeypatch.setattr(an_engine, "weigh_document", doubtful)
+    a_planned.set_reading(2, 174.5)
+    (banner,) = (b for b in a_planned.snapshot.banners if b.kind == "warning")
+    assert (banner.code, banner.hazard, banner.step) == ("reading-doubtful", "H24", Step.READINGS)
+    assert "strut 3 by the CT differs from its reading (value -1.250 mm)" in banner.message
+    assert a_planned.snapshot.view(Step.READINGS).summary == "read again: strut 3"
+    assert a_planned.snapshot.view(Step.READINGS).state == "done"

@@ -225,3 +225,12 @@ def test_the_shown_document_cannot_be_used_to_change_the_case(a_presenter):
     assert a_presenter.version.raw == raw
     a_presenter.set_limb(bone="femur")
     assert json.loads(a_presenter.version.raw)["limb"]["side"] == "left"
+
+
+def test_who_may_read_a_case_stays_as_it_was_and_leftovers_go(a_presenter, a_case_file):
+    a_case_file.chmod(0o600)
+    (a_case_file.parent / ".case.json.staging-killed").write_text("half")
+    a_presenter.set_case_id("other")
+    assert a_presenter.save_case()
+    assert a_case_file.stat().st_mode & 0o777 == 0o600
+    assert {path.name for path in a_case_file.parent.iterdir()} == {"case.json", "ct.txt"}

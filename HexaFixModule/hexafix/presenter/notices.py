@@ -107,6 +107,18 @@ def reading_differs(strut: int, first: float | None, second: float | None) -> Fa
     )
 
 
+def read_again(strut: int, difference_mm: float) -> Fault:
+    """H24: a reading that no gate refuses and that is yet doubtful."""
+    return Fault(
+        "reading-doubtful",
+        f"strut {strut} by the CT differs from its reading",
+        value=_reading(difference_mm),
+        hazard="H24",
+        where=f"strut_readings_mm[{strut - 1}]",
+        next_step=f"read strut {strut} again",
+    )
+
+
 def _reading(value: object) -> str:
     from hexafix.pipeline import format_mm
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hexafix.presenter.state import Table
+from hexafix.presenter.state import Step, Table
 
 
 def _mm(value: float | None) -> str:
@@ -34,6 +34,42 @@ def _measure(value: float | None) -> str:
 
 def _point(values: Any) -> tuple[str, ...]:
     return tuple(_mm(value) for value in values)
+
+
+def summary(step: Step, document: Mapping[str, Any]) -> str:
+    """A done step in a few words."""
+    match step:
+        case Step.LOAD:
+            return " x ".join(str(count) for count in document["size_ijk"]) + " voxels"
+        case Step.MARKERS:
+            count, others = len(document["balls"]), len(document["rejected"])
+            return f"{count} balls, {others} other places rejected"
+        case Step.NUMBERING:
+            return SETTLED.get(document.get("settled_by", ""), "numbered")
+        case Step.POSES:
+            rms = (_mm(document["rings"][ring]["rms_mm"]) for ring in ("proximal", "distal"))
+            return "residual {} mm proximal, {} mm distal".format(*rms)
+        case Step.READINGS:
+            doubtful = [s["strut"] for s in document["struts"] if s["verdict"] != "agrees"]
+            return "read again: " + _listed(doubtful) if doubtful else "readings and CT agree"
+        case Step.CORRECTION:
+            return "within the struts' stroke at the end"
+        case Step.SCHEDULE:
+            found = document["schedule"]
+            return f"{found['days']} days, {found['adjustments_per_day']} adjustments a day"
+    return "recomputed by another road, printed and read back"
+
+
+SETTLED = {
+    "layout": "settled by the layouts",
+    "strut-readings": "settled by the strut readings",
+    "user": "numbered by hand",
+}
+"""What settled a numbering, in words."""
+
+
+def _listed(struts: list[int]) -> str:
+    return ", ".join(f"strut {strut}" for strut in struts)
 
 
 def series(document: Mapping[str, Any]) -> Table:
@@ -145,7 +181,8 @@ def gates(found: Any) -> Table:
                 "pass" if gate["passed"] else "RED",
             )
         )
-        alerts.append("" if gate["passed"] else gate["message"])
+        told = "told" in gate["unit"] and "BEYOND" in gate["name"]
+        alerts.append(gate["message"] if told or not gate["passed"] else "")
     columns = ("Gate", "What", "Value", "Limit", "Unit", "Verdict")
     return Table(columns, tuple(rows), tuple(alerts))
 

@@ -87,6 +87,8 @@ def _step(core: Core, step: Step) -> StepView:
     if found is not None:
         faults = (*faults, *found.faults)
     summary = SUMMARIES[state]
+    if state == StepState.DONE and found is not None:
+        summary = tables.summary(step, found.document)
     if state in (StepState.REFUSED, StepState.WAITING):
         wrong = found.faults if found is not None else ()
         summary = _first_words([*wrong, *(f for f in missing if f in faults), *missing]) or summary
@@ -174,6 +176,11 @@ def _banners(core: Core) -> Iterator[Banner]:
             yield notices.banner(fault, kind=kind, step=step)
         for text in result.document.get("warnings", ()):
             yield notices.banner(Fault("warning", text), kind="warning", step=step)
+    weighed = core.result(Step.READINGS)
+    for strut in weighed.document.get("struts", ()) if weighed is not None else ():
+        if strut["verdict"] == "read-again":
+            fault = notices.read_again(strut["strut"], strut["difference_mm"])
+            yield notices.banner(fault, kind="warning", step=Step.READINGS)
     if core.job is None and core.is_done(Step.EXPORT):
         for fault in _unanswered(core):
             yield notices.banner(fault, kind="info", step=Step.EXPORT)
