@@ -272,7 +272,7 @@ def test_a_reload_of_the_page_keeps_everything(a_planned_desk):
     a_planned_desk.page.reload()
     a_planned_desk.at("body-poses").wait_for()
     a_planned_desk.wait("export", "done")
-    assert a_planned_desk.at("case-id").inner_text().startswith(case_id(a_planned_desk))
+    assert a_planned_desk.at("case-name").inner_text().startswith(case_id(a_planned_desk))
     assert a_planned_desk.at("playback").is_visible()
 
 
@@ -302,6 +302,33 @@ def test_every_control_has_a_name(a_planned_desk):
     for step in ("load", "markers", "numbering", "poses", "readings", "correction", "export"):
         a_planned_desk.open(step)
         assert a_planned_desk.page.evaluate(UNNAMED) == []
+
+
+def test_a_case_saved_under_a_new_name_is_opened_as_it_was(a_planned_desk, tmp_path):
+    path = tmp_path / "kept.json"
+    a_planned_desk.open("load")
+    a_planned_desk.write("case-id", "left-tibia-02")
+    a_planned_desk.at("unsaved").wait_for()
+    a_planned_desk.click("save-as")
+    a_planned_desk.at("chooser-path").locator("input").fill(str(path))
+    a_planned_desk.click("chooser-accept")
+    a_planned_desk.at("unsaved").wait_for(state="detached")
+    saved, given = json.loads(path.read_text()), json.loads(a_planned_desk.case.read_text())
+    assert saved["case_id"] == "left-tibia-02"
+    assert (path.parent / saved["image"]["path"]).samefile(
+        a_planned_desk.case.parent / given["image"]["path"]
+    )
+    assert saved | {"case_id": 0, "image": 0} == given | {"case_id": 0, "image": 0}
+    a_planned_desk.write("case-id", "left-tibia-03")
+    a_planned_desk.at("unsaved").wait_for()
+    a_planned_desk.click("open-case")
+    a_planned_desk.click("ask-go-on")
+    a_planned_desk.at("chooser-path").locator("input").fill(str(path))
+    a_planned_desk.click("chooser-accept")
+    a_planned_desk.at("unsaved").wait_for(state="detached")
+    a_planned_desk.wait("load", "done")
+    assert a_planned_desk.at("case-id").locator("input").input_value() == "left-tibia-02"
+    assert a_planned_desk.at("playback").count() == 0
 
 
 def test_nothing_was_asked_elsewhere_and_the_console_is_clean(a_planned_desk):

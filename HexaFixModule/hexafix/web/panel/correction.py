@@ -58,8 +58,7 @@ class CorrectionStep:
         from trame.widgets import html
         from trame.widgets import vuetify3 as v
 
-        name, context = self._name, self._context
-        draft = name.draft
+        draft = self._name.draft
         with (
             v.VBtnToggle(
                 v_model=(f"{draft}.kind",),
@@ -96,6 +95,13 @@ class CorrectionStep:
             note("Where the proximal ring stands in the distal ring at the end.")
             self._three("position", XYZ, "mm")
             self._three("target_angles", ANGLES, "deg")
+        self._setting()
+
+    def _setting(self) -> None:
+        """What is not set yet, the button that sets it, and what it comes to."""
+        from trame.widgets import html
+
+        name, context = self._name, self._context
         html.Div(
             f"{{{{ {name.pending} }}}}",
             v_if=name.pending,
@@ -223,6 +229,10 @@ class CorrectionStep:
         """
         correction = snapshot.document.get("correction")
         new = dict(self._data.draft)
+        if center is None and self._centered:
+            # another image: no point of the old one stays
+            self._centered, self._shown = False, None
+            new["center"], new["origin"] = ["", "", ""], ["", "", ""]
         if center is not None and not self._centered:
             self._centered = True
             words = point_words(center)

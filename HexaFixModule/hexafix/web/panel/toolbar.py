@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hexafix.web.files import CASE_SUFFIXES
 from hexafix.web.panel.chooser import Chooser
@@ -16,7 +18,7 @@ NOTICE = "Research software. Not a medical device. Plans are not approved."
 
 @dataclass
 class ToolbarState:
-    """Whether the user is asked before unsaved edits are lost, and for what."""
+    """Whether the user is asked before unsaved edits are lost."""
 
     asking: bool = False
 
@@ -26,6 +28,7 @@ class Toolbar:
 
     def __init__(self, context: PanelContext, chooser: Chooser) -> None:
         self._context, self._chooser = context, chooser
+        self._then: Callable[[], Any] = lambda: None
         self._data, self._name = typed_state(context.server, ToolbarState)
         context.server.trigger("hx_undo")(self.undo)
         context.server.trigger("hx_redo")(self.redo)
@@ -38,10 +41,11 @@ class Toolbar:
         name = self._context.name
         with html.Div(classes="hxp-brand", **marked("brand")):
             html.Span("HexaFix", classes="hxp-logo")
-            with html.Span(classes="hxp-case", **marked("case-id")):
+            with html.Span(classes="hxp-case", **marked("case-name")):
                 html.Span(f"{{{{ {name.case_id} || 'no case' }}}}")
                 html.Span("not saved", v_if=name.edited, classes="hxp-unsaved", **marked("unsaved"))
         with html.Div(classes="hxp-row", role="group"):
+            icon_button("mdi-file-plus-outline", "New case", "new-case", self.new_case)
             icon_button("mdi-folder-open-outline", "Open a case", "open-case", self.open_case)
             save = f"{name.case_path} ? 'Save the case' : 'Save the case as a file'"
             icon_button("mdi-content-save-outline", (save,), "save-case", self.save)
@@ -108,25 +112,41 @@ class Toolbar:
 
     def open_case(self) -> None:
         """Ask for a case file, and before that whether unsaved edits may be lost."""
+        self._unless_unsaved(self._choose_case)
+
+    def new_case(self) -> None:
+        """Start with an empty case, and before that ask whether unsaved edits may be lost."""
+        self._unless_unsaved(lambda: self._context.act(self._context.presenter.new_case))
+
+    def _unless_unsaved(self, work: Callable[[], Any]) -> None:
+        self._then = work
         if self._context.presenter.snapshot.edited:
             self._data.asking = True
         else:
-            self._choose_case()
+            work()
+
+    def _go_on(self) -> None:
+        self._data.asking = False
+        self._then()
 
     def _choose_case(self) -> None:
-        self._data.asking = False
-        context = self._context
         self._chooser.ask(
             "Open a case",
             "Open",
-            lambda path: context.act(lambda: context.presenter.open_case(path)),
+            self._open,
             suffixes=CASE_SUFFIXES,
             hint="A case file (case.json).",
         )
 
-    def new_case(self) -> None:
-        """Start with an empty case, if nothing unsaved is lost by it."""
-        self._context.act(self._context.presenter.new_case)
+    def _open(self, path: Path) -> None:
+        """Open a case file, and read its image if it names one."""
+        from hexafix.presenter import Step, StepState
+
+        context = self._context
+        if context.act(lambda: context.presenter.open_case(path)):
+            view = context.presenter.snapshot.view(Step.LOAD)
+            if view.state == StepState.READY:
+                context.act(lambda: context.presenter.run(Step.LOAD))
 
     def save(self) -> None:
         """Save where the case came from, else ask."""
@@ -157,11 +177,11 @@ class Toolbar:
             v.VCard(**marked("ask-unsaved", label="Edits are not saved")),
         ):
             v.VCardTitle("Edits are not saved", classes="text-subtitle-1 font-weight-bold")
-            v.VCardText("Another case is opened and the edits of this one are lost.")
+            v.VCardText("If you go on, the edits of this case since it was saved are lost.")
             with v.VCardActions():
                 v.VSpacer()
                 button("Keep this case", "ask-keep", self._keep)
-                button("Open another", "ask-open", self._choose_case, primary=True)
+                button("Go on", "ask-go-on", self._go_on, primary=True)
 
     def _keep(self) -> None:
         self._data.asking = False
