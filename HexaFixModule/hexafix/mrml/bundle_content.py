@@ -175,7 +175,9 @@ class _SceneFile:
         if self._depth > 40:
             raise ValueError("elements in elements in elements")
         if tag not in NODES:
-            self._add("bundle-foreign-node", "the scene holds a node of no kind of ours", "H49")
+            self.faults.append(
+                _fault("bundle-foreign-node", "the scene holds a node of no kind of ours", "H49")
+            )
             return
         for name, value in attributes.items():
             self._attribute(tag, name, value)
@@ -183,14 +185,18 @@ class _SceneFile:
             self._module(attributes)
 
     def _attribute(self, tag: str, name: str, value: str) -> None:
-        kind = NODES[tag]
+        kind = NODES.get(tag, "")
         if kind and (name == "fileName" or _LIST_MEMBER.fullmatch(name)):
             if self._folder / value not in self._files or not value.endswith(kind):
-                self._add("bundle-reference", "a node names a file outside the bundle", "H50")
+                self.faults.append(
+                    _fault("bundle-reference", "a node names a file outside the bundle", "H50")
+                )
         elif "file" in name.lower() and name not in _HARMLESS:
-            self._add("bundle-reference", "a node names a file in an unknown way", "H50")
+            self.faults.append(
+                _fault("bundle-reference", "a node names a file in an unknown way", "H50")
+            )
         elif name.lower() in ("uri", "url", "urls") or "://" in value:
-            self._add("bundle-reference", "a node names an address", "H50")
+            self.faults.append(_fault("bundle-reference", "a node names an address", "H50"))
 
     def _module(self, attributes: dict[str, str]) -> None:
         """Desktop Slicer looks up modules by these names."""
@@ -200,10 +206,9 @@ class _SceneFile:
         }
         own = {name for name in attributes if not _PARAMETER.match(name)} <= _NODE_ATTRIBUTES
         if names != {MODULE} or not held <= PARAMETERS or not own:
-            self._add("bundle-foreign-module", "the scene holds another module's data", "H49")
-
-    def _add(self, code: str, what: str, hazard: str) -> None:
-        self.faults.append(_fault(code, what, hazard))
+            self.faults.append(
+                _fault("bundle-foreign-module", "the scene holds another module's data", "H49")
+            )
 
 
 _LIST_MEMBER, _PARAMETER = re.compile(r"fileListMember\d+"), re.compile(r"parameter\d+$")
