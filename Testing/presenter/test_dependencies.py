@@ -165,3 +165,17 @@ def test_an_older_image_gives_way_with_everything_made_of_it(a_planned, tmp_path
     assert states(a_planned)["load"] == "stale"
     assert not a_planned.is_fresh(Step.POSES)
     assert not a_planned.snapshot.can_export
+
+
+def test_pictures_show_the_layout_as_it_is_now(a_planned, an_engine, monkeypatch):
+    before = a_planned.pictures()
+    assert before["strut_curves"] == a_planned.value(Step.SCHEDULE).made
+    monkeypatch.setattr(
+        an_engine, "layout_pictures", lambda p, _: {"layout_proximal": str(p.sites[0].radius_mm)}
+    )
+    rows = [dict(row) for row in a_planned.snapshot.document["markers"]["proximal"]]
+    for radius in (90.0, 95.0):
+        rows[0]["radius_mm"] = radius
+        a_planned.set_markers("proximal", rows)
+        shown = a_planned.pictures()
+        assert shown == {**before, "layout_proximal": str(radius)}

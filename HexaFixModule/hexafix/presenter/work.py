@@ -125,21 +125,20 @@ class Work(Core):
             return MappingProxyType(dict(self.value(Step.EXPORT).files))
 
     def pictures(self) -> dict[str, str]:
-        """SVG pictures by name: of the plan shown, else of the layouts."""
+        """SVG pictures by name: of the plan shown; the layouts always as the case has them now."""
         with self.lock:
-            shown, layout = self.results.shown(Step.SCHEDULE), self.layout
-            made_of = shown or layout[0]
-            if self._pictures is None or self._pictures[0] is not made_of:
-                self._pictures = (made_of, self._drawn(shown))
+            shown, fresh = self.results.shown(Step.SCHEDULE), self.is_fresh(Step.SCHEDULE)
+            made_of = (shown, fresh, self.layout[0])
+            if self._pictures is None or self._pictures[0] != made_of:
+                self._pictures = (made_of, self._drawn(shown, fresh))
             return dict(self._pictures[1])
 
-    def _drawn(self, plan: Result | None) -> dict[str, str]:
-        if plan is not None:
-            return dict(self.engine.pictures(plan.document))
+    def _drawn(self, plan: Result | None, fresh: bool) -> dict[str, str]:
+        made = {} if plan is None else dict(self.engine.pictures(plan.document))
         parts = self.inputs.parts
-        if parts.proximal is None or parts.distal is None:
-            return {}
-        return dict(self.engine.layout_pictures(parts.proximal, parts.distal))
+        if fresh or parts.proximal is None or parts.distal is None:
+            return made
+        return {**made, **self.engine.layout_pictures(parts.proximal, parts.distal)}
 
     # ------------------------------------------------------------ the job
 
