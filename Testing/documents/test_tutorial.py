@@ -1,0 +1,194 @@
+"""The tutorial: its steps, pictures, figures, controls and commands are real and whole."""
+
+import ast
+import importlib.util
+import json
+import re
+import shutil
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = ROOT / "Resources" / "Documents"
+PACKAGE = ROOT / "HexaFixModule" / "hexafix"
+
+
+def loaded(name):
+    # as in a run of the command, whose folder the interpreter puts first
+    if str(DOCUMENTS) not in sys.path:
+        sys.path.insert(0, str(DOCUMENTS))
+    spec = importlib.util.spec_from_file_location(name, DOCUMENTS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def make():
+    return loaded("make_tutorial")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return loaded("tutorial_run")
+
+
+@pytest.fixture
+def a_copy(make, tmp_path):
+    """The tutorial in a folder of its own, to be spoiled."""
+    for name in ("tutorial.in.md", "tutorial.md"):
+        shutil.copy(DOCUMENTS / name, tmp_path / name)
+    shutil.copytree(DOCUMENTS / make.IMAGES, tmp_path / make.IMAGES)
+    return tmp_path
+
+
+def rewrite(folder, old, new, *names):
+    for name in names or ("tutorial.in.md", "tutorial.md"):
+        text = (folder / name).read_text(encoding="utf-8")
+        assert old in text
+        (folder / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+@cache
+def texts(*rooms):
+    """Every text of the rooms' sources; in a made one, `\\0` stands for what is put in."""
+    held = []
+    for path in sorted(p for room in rooms for p in (PACKAGE / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                held.append(node.value)
+            elif isinstance(node, ast.JoinedStr):
+                parts = [v.value if isinstance(v, ast.Constant) else "\0" for v in node.values]
+                held.append("".join(parts))
+    return held
+
+
+def is_made(name):
+    """Whether a source of the browser's page makes a part of that name.
+
+    It stands there as it is, with parts put in by Python (``f"run-{step}"``), or as an expression
+    of the page (``'number-' + item.number``).
+    """
+    for text in texts("web"):
+        known, made, rest = text.partition("\0")
+        if text in (name, f'data-testid="{name}"') or (
+            made and not rest and len(known) > 3 and name.startswith(known)
+        ):
+            return True
+        looped = re.fullmatch(r"'([\w-]{3,})' \+ .+", text)
+        if looped and name.startswith(looped[1]):
+            return True
+    return False
+
+
+def test_the_page_is_whole(make):
+    assert make.faults(DOCUMENTS) == []
+
+
+def test_every_control_named_exists_in_the_panel(make):
+    web = texts("web")
+    for words, name in make.CONTROLS.items():
+        assert any(words in text for text in web) or is_made(f"download-{words}"), words
+        assert name is None or is_made(name), name
+    assert not is_made("run-everything-else")
+
+
+def test_every_part_that_the_run_uses_exists_in_the_panel(run):
+    source = "".join(
+        (DOCUMENTS / name).read_text(encoding="utf-8")
+        for name in ("tutorial_run.py", "tutorial_desk.py")
+    )
+    used = set(re.findall(r'(?:at|words|read)\(\s*"([\w.-]+)"', source))
+    used |= {f"table-{name}" for name in re.findall(r'(?:rows|value)\("(\w+)"', source)}
+    assert {"undo", "confirm-left", "table-balls", "gates-summary"} <= used
+    assert [name for name in sorted(used) if not is_made(name)] == []
+
+
+def test_the_words_in_slanted_letters_are_on_the_screen(make):
+    page = (DOCUMENTS / "tutorial.md").read_text(encoding="utf-8").replace("\n", " ")
+    own = {"You see", "Check"}
+    known = "\n".join(texts("web", "presenter", "mrml")).replace("\0 front", "A front\nB front")
+    measured = set(make.figures(DOCUMENTS).values())
+    said = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", page)) - own
+    assert {"refused", "A front", "Four views"} <= said
+    assert [words for words in said if words not in known and words not in measured] == []
+
+
+def test_the_pictures_are_legible_and_small(make):
+    from PIL import Image
+
+    for name in make.PICTURES:
+        with Image.open(DOCUMENTS / make.IMAGES / f"{name}.png") as image:
+            assert image.width == make.WIDTH_PX, name
+            assert 500 <= image.height <= 1750, name
+            assert len(image.convert("RGB").getcolors(1 << 24)) > 50, name
+
+
+def test_it_says_what_it_is():
+    page = (DOCUMENTS / "tutorial.md").read_text(encoding="utf-8")
+    head = " ".join(page.split("## ")[0].split())
+    for words in ("Research software. Not a medical device.", "simulated", "not approved"):
+        assert words in head.replace("> ", "")
+
+
+def test_its_links_lead_somewhere():
+    for name in ("tutorial.md", "tutorial.in.md"):
+        page = (DOCUMENTS / name).read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)#:]+)\)", page):
+            assert (DOCUMENTS / target).exists(), target
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("## 10. ", "## 11. ", "not ten steps"),
+        ("images/tutorial/04-refused.png", "images/tutorial/03-numbers.png", "not one described"),
+        ("hexafix serve demo", "hexafix server demo", "hexafix server demo"),
+        ("hexafix demo --out demo", "hexafix demo --output demo", "--output"),
+        ("make_tutorial.py`", "make_tutorial.py --all`", "no such command"),
+        ("**Find the balls**", "**Search the balls**", "no control 'Search the balls'"),
+        ("**Plan all steps**", "*Plan all steps*", "'Plan all steps' is not named"),
+    ],
+)
+def test_a_spoiled_page_is_told(make, a_copy, old, new, says):
+    rewrite(a_copy, old, new)
+    assert any(says in fault for fault in make.faults(a_copy))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("{days} days", "22 days", "typed by hand: 22 days"),
+        ("{rms_proximal} mm", "{rms_of_proximal} mm", "no figure rms_of_proximal"),
+        ("{pages} pages", "many pages", "unused figure pages"),
+    ],
+)
+def test_a_figure_that_is_not_of_the_run_is_told(make, a_copy, old, new, says):
+    rewrite(a_copy, old, new, "tutorial.in.md")
+    assert any(says in fault for fault in make.faults(a_copy))
+
+
+def test_figures_of_another_run_are_told(make, a_copy):
+    path = a_copy / make.IMAGES / "figures.json"
+    figures = json.loads(path.read_text(encoding="utf-8"))
+    figures["days"] = str(int(figures["days"]) + 1)
+    path.write_text(json.dumps(figures), encoding="utf-8")
+    assert any("is not tutorial.in.md" in fault for fault in make.faults(a_copy))
+
+
+def test_a_picture_missing_left_over_or_too_large_is_told(make, a_copy):
+    images = a_copy / make.IMAGES
+    (images / "05-poses.png").rename(images / "05-rings.png")
+    assert any("left over" in fault and "05-rings" in fault for fault in make.faults(a_copy))
+    (images / "05-rings.png").write_bytes(bytes(make.LIMIT_BYTES))
+    assert any("bytes of pictures" in fault for fault in make.faults(a_copy))
+
+
+def test_a_screen_that_differs_from_the_plan_stops_the_run(run):
+    assert run.shows("0.047", 0.046526)
+    assert run.shows("22", 22)
+    assert not run.shows("0.048", 0.046526)
+    assert not run.shows("85.9", 85.98)
