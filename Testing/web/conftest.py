@@ -51,7 +51,7 @@ def start_serving():
         )
         started.append(process)
         url = process.stdout.readline().strip()
-        assert url.startswith("http://"), process.stderr.read()
+        assert url.startswith(("http://", "https://")), process.stderr.read()
         return process, url
 
     yield start
@@ -103,3 +103,20 @@ def a_page(a_chromium, tmp_path):
     page.on("pageerror", lambda error: page.said.append(str(error)))
     yield page
     context.close()
+
+
+@pytest.fixture(scope="session")
+def a_certificate(tmp_path_factory):
+    """Certificate and key for localhost, made here."""
+    folder = tmp_path_factory.mktemp("tls")
+    certificate, key = folder / "certificate.pem", folder / "key.pem"
+    words = (
+        "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost"
+    )
+    names = ["-addext", "subjectAltName=DNS:localhost"]
+    subprocess.run(
+        ["openssl", *words.split(), *names, "-out", certificate, "-keyout", key],
+        check=True,
+        capture_output=True,
+    )
+    return certificate, key

@@ -2,6 +2,7 @@
 
 import asyncio
 import http.client
+import ssl
 import threading
 
 import pytest
@@ -222,3 +223,21 @@ def test_every_answer_keeps_the_browser_on_this_machine(a_guarded_server):
         assert answer.getheader("Cache-Control") == "no-store"
         assert answer.getheader("Access-Control-Allow-Origin") is None
         assert answer.getheader("Server") is None
+
+
+def test_with_a_certificate_the_address_and_the_cookie_are_for_tls_alone(a_certificate):
+    certificate, key = a_certificate
+    one = access(host="0.0.0.0", token="auto", certificate=certificate, key=key)
+    assert one.url(8443).startswith("https://127.0.0.1:8443/?token=")
+    assert one.tls.minimum_version == ssl.TLSVersion.TLSv1_2
+    assert access().url(8443).startswith("http://")
+
+
+def test_a_certificate_without_its_key_is_refused(a_certificate, tmp_path):
+    certificate, key = a_certificate
+    other = tmp_path / "other.pem"
+    other.write_text("no key")
+    for pair in ((certificate, None), (None, key), (certificate, other), (tmp_path / "x", key)):
+        with pytest.raises(InputError) as caught:
+            access(certificate=pair[0], key=pair[1])
+        assert caught.value.faults[0].code == "certificate-unusable"

@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 from pathlib import Path
@@ -145,6 +146,23 @@ def test_ctrl_c_ends_the_server_and_everything_it_started(start_serving, a_case_
     assert of_session(process.pid) == []
     with pytest.raises(ConnectionRefusedError):
         ask(url, "/")
+
+
+def test_with_a_certificate_the_server_speaks_tls_alone(start_serving, a_certificate):
+    certificate, key = a_certificate
+    _, url = start_serving("--host", "localhost", "--certificate", certificate, "--key", key)
+    parts = urlsplit(url)
+    assert parts.scheme == "https"
+    trusted = ssl.create_default_context(cafile=certificate)
+    connection = http.client.HTTPSConnection("localhost", parts.port, timeout=10, context=trusted)
+    connection.request("GET", f"/?{parts.query}")
+    answer = connection.getresponse()
+    answer.read()
+    assert answer.status == 303
+    assert "Secure" in answer.getheader("Set-Cookie")
+    connection.close()
+    with pytest.raises((http.client.HTTPException, OSError)):
+        ask(f"http://localhost:{parts.port}", "/")
 
 
 def test_a_case_that_is_not_there_is_an_input_error():

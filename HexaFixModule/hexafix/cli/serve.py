@@ -24,6 +24,10 @@ def serve(
         str | None,
         Parameter(help="Secret that the browser must bring; auto, and without --host: a new one."),
     ] = None,
+    certificate: Annotated[
+        Path | None, Parameter(help="PEM file; with --key, the connection is encrypted.")
+    ] = None,
+    key: Annotated[Path | None, Parameter(help="PEM file of the certificate's key.")] = None,
     no_browser: Annotated[bool, Parameter(negative="", help="Only print the address.")] = False,
     measure: Annotated[
         bool,
@@ -33,7 +37,7 @@ def serve(
     """Open the workstation in the browser; it serves this machine only and ends by Ctrl-C."""
     from hexafix.web.server import access, is_loopback
 
-    allowed = access(host=host, port=port, token=token)
+    allowed = access(host=host, port=port, token=token, certificate=certificate, key=key)
     if case is not None and not case.is_file():
         raise InputError.of(
             "case-missing",
@@ -51,10 +55,10 @@ def serve(
         return _measure(case)
     from hexafix.web.run import serve as run
 
-    if not is_loopback(host):
+    if not is_loopback(host) and allowed.tls is None:
         print(
-            "hexafix: others can reach this address and nothing on the way is encrypted: use it "
-            "only inside a network you trust, or an SSH tunnel instead of --host",
+            "hexafix: others can reach this address and nothing on the way is encrypted: add "
+            "--certificate and --key, or leave --host out and use an SSH tunnel",
             file=sys.stderr,
         )
 

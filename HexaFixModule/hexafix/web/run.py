@@ -65,9 +65,7 @@ async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any])
     presenter = started_presenter(case)
     workstation = Workstation(presenter=presenter)
     server = workstation.server
-    server.controller.on_server_bind.add(
-        lambda bound: guard_application(bound.app, access, workstation)
-    )
+    server.controller.on_server_bind.add(lambda bound: guard(bound, access, workstation))
     server.controller.on_server_ready.add(lambda **_: ready(access.url(server.port)))
     running = asyncio.ensure_future(start(server, access))
     stopped = asyncio.ensure_future(stop.wait())
@@ -95,12 +93,15 @@ def start(server: Any, access: Access) -> Any:
     )
 
 
-def guard_application(app: Any, access: Access, workstation: Any) -> None:
-    """Guard, page and downloads, before trame's own routes."""
+def guard(bound: Any, access: Access, workstation: Any) -> None:
+    """Guard, page and downloads before trame's own routes, and encryption if it is asked for."""
     from trame_client.module import vue3
 
     from hexafix.web.page import add_page, index_text, policy
 
+    app = bound.app
+    if access.tls is not None:
+        bound.config["ssl"] = access.tls
     text = index_text(Path(vue3.www))
     Guard(access, policy(text)).install(app)
     add_page(app, text)

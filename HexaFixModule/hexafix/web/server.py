@@ -9,8 +9,10 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import secrets
+import ssl
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
@@ -38,6 +40,8 @@ class Access:
         Port to bind; 0 lets the system choose.
     token : str
         What the first request must carry.
+    tls : ssl.SSLContext or None
+        Encrypts what others on the way could read.
     session : str
         Value of the cookie given for the token; never the token itself.
     """
@@ -45,17 +49,39 @@ class Access:
     host: str
     port: int
     token: str = field(repr=False)
+    tls: ssl.SSLContext | None = field(default=None, repr=False)
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
 
     def url(self, port: int) -> str:
         """The address to open, with the token."""
         shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         name = f"[{shown}]" if ":" in shown else shown
-        return f"http://{name}:{port}/?token={quote(self.token, safe='')}"
+        scheme = "https" if self.tls else "http"
+        return f"{scheme}://{name}:{port}/?token={quote(self.token, safe='')}"
 
 
-def access(*, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> Access:
-    """Check where to listen; a host that others can reach needs a token said on purpose."""
+def access(
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    token: str | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
+) -> Access:
+    """Check where to listen; a host that others can reach needs a token said on purpose.
+
+    Parameters
+    ----------
+    host, port, token
+        As in `Access`; token None or ``auto``: a new one.
+    certificate, key : Path or None
+        PEM files for an encrypted connection; both or none.
+
+    Raises
+    ------
+    InputError
+        If others could come in, or certificate and key do not go together.
+    """
     if not is_loopback(host) and token is None:
         raise InputError.of(
             "host-without-token",
@@ -76,7 +102,25 @@ def access(*, host: str = "127.0.0.1", port: int = 0, token: str | None = None) 
             where="--token",
             next_step="use --token auto",
         )
-    return Access(host=host, port=port, token=token)
+    return Access(host=host, port=port, token=token, tls=encryption(certificate, key))
+
+
+def encryption(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
+    """TLS 1.2 or newer by a certificate and its key; None without both."""
+    if certificate is None and key is None:
+        return None
+    try:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.minimum_version = ssl.TLSVersion.TLSv1_2
+        context.load_cert_chain(str(certificate or ""), str(key or ""))
+    except (OSError, ValueError) as error:
+        raise InputError.of(
+            "certificate-unusable",
+            "certificate and key cannot be used together",
+            where="--certificate",
+            next_step="give --certificate and --key, both as PEM files, the key without a password",
+        ) from error
+    return context
 
 
 def is_loopback(host: str) -> bool:
@@ -150,7 +194,12 @@ class Guard:
             return web.Response(status=401, text="the token is not the one of this server")
         answer = web.Response(status=303, headers={"Location": "/"})
         answer.set_cookie(
-            cookie_name(request), self._access.session, httponly=True, samesite="Strict", path="/"
+            cookie_name(request),
+            self._access.session,
+            httponly=True,
+            secure=self._access.tls is not None,
+            samesite="Strict",
+            path="/",
         )
         return answer
 
