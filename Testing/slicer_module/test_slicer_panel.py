@@ -56,6 +56,11 @@ def test_slicer_shows_title_icon_and_that_it_is_no_medical_device(a_walk):
     assert "not a medical device" in described["help"]
 
 
+def test_logic_and_test_stand_on_slicers_base_classes(a_walk):
+    assert a_walk[0]["logic_has_slicers_scene"] is True
+    assert a_walk[0]["test_is_a_unittest"] == "runTest"
+
+
 def test_the_panel_opens_and_an_edit_and_undo_go_through_its_widgets(a_walk):
     seen = a_walk[0]
     assert seen["opened"]

@@ -41,6 +41,9 @@ seen["described"] = {
     "icon": not described.icon.isNull(),
 }
 
+seen["logic_has_slicers_scene"] = HexaFixModule.HexaFixModuleLogic().scene is slicer.mrmlScene
+seen["test_is_a_unittest"] = HexaFixModule.HexaFixModuleTest().id().split(".")[-1]
+
 # A scene that was saved by HexaFix is open already.
 held = json.loads(Path(sys.argv[1]).read_text())
 SceneLogic(slicer.mrmlScene).save_case_into({**held, "case_id": "of-the-scene"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from hexafix.errors import Fault, HexaFixError
 from hexafix.mrml.app import HeadlessMrmlApp
 from hexafix.mrml.logic import SceneLogic
 from hexafix.mrml.nodes import find, slicer_core
-from hexafix.phantom import Phantom, PhantomSpec, make_phantom, write_phantom
+from hexafix.phantom import Phantom, PhantomSpec, make_phantom
 from hexafix.phantom.compare import errors_against_truth
 from hexafix.verify import verify_export
 
@@ -75,10 +76,11 @@ def check_on_phantom(plan: PlanNode, scene: Any, *, phantom: Phantom | None = No
     phantom = phantom or make_phantom(SPEC)
     with tempfile.TemporaryDirectory(prefix="hexafix-test-") as name:
         folder = Path(name)
-        write_phantom(phantom, folder / "bundle", image_format="nrrd")
+        # The image is the volume node: no file of it is needed.
+        (folder / "case.json").write_text(json.dumps(phantom.case), encoding="utf-8")
         node = SceneLogic(scene).add_volume(phantom.volume, "Phantom")
         out = folder / "export"
-        document = plan(node, folder / "bundle" / "case.json", out)
+        document = plan(node, folder / "case.json", out)
         faults = _missing_files(out)
         if not faults and not verify_export(out)["verified"]:
             faults.append(_fault("the export does not verify"))
