@@ -285,6 +285,15 @@ def test_a_click_without_a_mode_fills_the_place_only(panel, widgets, presenter):
     assert dict(presenter.snapshot.document) == before
 
 
+def test_a_click_does_nothing_of_the_page_that_was_left(panel, widgets, presenter):
+    presenter.go_to(Step.MARKERS)
+    widgets.tick("pickMarkerButton")
+    presenter.go_to(Step.READINGS)
+    assert widgets.get("pickMarkerButton", "checked") is False
+    panel.clicked((1.0, 2.0, 3.0))
+    assert "marker_edits" not in presenter.snapshot.document
+
+
 def test_a_number_is_given_only_by_a_click_on_a_ball(panel, widgets):
     widgets.click("addProximalMarkerButton")
     widgets.fill("proximalMarkersTable", LAYOUT[:1])

@@ -58,6 +58,7 @@ class Panel:
         self.dragging_changed = Signal()
         self._shown: dict[tuple[str, str], Any] = {}
         self._updating = False
+        self._page_step = presenter.snapshot.current
         self._pictures: tuple[Any, Table, dict[str, str]] = (None, Table(()), {})
         self.playback_row = 0
         self.playing = self.dragging = False
@@ -132,7 +133,14 @@ class Panel:
             self._updating = False
 
     def _follow(self, snapshot: Snapshot) -> None:
-        """Open the form of the case's correction as long as the user has not opened another."""
+        """End what belongs to the page left; open the form of the case's correction."""
+        if snapshot.current != self._page_step:
+            # A click meant for one page must not do another page's work.
+            self._page_step, self.picking = snapshot.current, ""
+            if self.playing:
+                self.play(False)
+            if self.dragging:
+                self.drag(False)
         held = correction.kind_in_case(snapshot)
         if held in correction.KINDS and not self.correction_typed:
             place = correction.KINDS.index(held)

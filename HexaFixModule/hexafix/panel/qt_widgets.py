@@ -191,9 +191,10 @@ class QtWidgets:
                 self._paint(item, alert=bool(alert), stale=table.stale)
                 widget.setItem(row, column, item)
         widget.resizeColumnsToContents()
+        widest = WIDEST_COLUMN if len(table.columns) > 3 else 2 * WIDEST_COLUMN
         for column in range(len(table.columns) - 1):
-            if int(widget.columnWidth(column)) > WIDEST_COLUMN:
-                widget.setColumnWidth(column, WIDEST_COLUMN)
+            if int(widget.columnWidth(column)) > widest:
+                widget.setColumnWidth(column, widest)
         if 0 <= kept < len(table.rows):
             widget.selectRow(kept)
 
@@ -235,7 +236,9 @@ class QtWidgets:
         if content:
             pixmap.loadFromData(self.kit.QByteArray(content))
         if not pixmap.isNull():
-            width = max(120, min(int(read(widget, "width")) - 4, int(read(pixmap, "width"))))
+            # A label on a page that was never shown has no width yet, but the least one.
+            room = max(int(read(widget, "minimumWidth")), int(read(widget, "width"))) - 4
+            width = min(room, int(read(pixmap, "width")))
             pixmap = pixmap.scaledToWidth(width, self.kit.Qt.SmoothTransformation)
         widget.setPixmap(pixmap)
 

@@ -61,6 +61,7 @@ class View3D:
         self._fitted = False
         self._pressed: tuple[int, ...] | None = None
         self._listen()
+        self.look((0, -1, 0), (0, 0, 1))
 
     def _head(self, q: Any) -> Any:
         across = q.QHBoxLayout()
