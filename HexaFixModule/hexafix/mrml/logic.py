@@ -128,7 +128,7 @@ class SceneLogic:
     def open_bundle(self, path: Path) -> None:
         """Replace our nodes by those of a bundle; a refused one leaves the scene as it was."""
         bundle.open_bundle(self.scene, path)
-        self._geometry = frame.stored_geometry(self.scene)
+        self._geometry = None
 
     def show_landmarks(
         self, moving: Sequence[Sequence[float]], fixed: Sequence[Sequence[float]]
@@ -161,7 +161,7 @@ class SceneLogic:
         moving : str
             ``proximal`` or ``distal``.
         """
-        fragments.show_target(self.scene, self._geometry, fragment_lps, moving)
+        fragments.show_target(self.scene, self._shown_geometry(), fragment_lps, moving)
 
     def drag_fragment(self, on: bool) -> None:
         """Show or hide the handles that drag the target of the moving fragment."""
@@ -184,10 +184,17 @@ class SceneLogic:
 
     def show_playback_row(self, playback: Playback | None, index: int | None) -> None:
         """Move frame and bone to a row of the schedule; None: where the CT shows them."""
-        if self._geometry is not None:
+        geometry = self._shown_geometry()
+        if geometry is not None:
             row = None if playback is None or index is None else playback.rows[index]
             moving = None if playback is None else playback.moving
-            frame.show_moment(self.scene, self._geometry, row, moving)
+            frame.show_moment(self.scene, geometry, row, moving)
+
+    def _shown_geometry(self) -> SceneGeometry | None:
+        """Rings as the CT shows them, of a scene that was opened too; None before there are any."""
+        if self._geometry is None:
+            self._geometry = frame.stored_geometry(self.scene)
+        return self._geometry
 
     # ------------------------------------------------------------- plan
 
@@ -254,6 +261,7 @@ class SceneLogic:
     def _show_all(self, volume_node: Any, case: Case, plan: Plan, accepted: bool) -> None:
         from hexafix import pipeline
 
+        volumes.adopt(self.scene, volume_node)
         recognised = plan.recognised
         ball_of = recognised.numbering.ball_of_number
         judged = {"assigned": {str(number): index for number, index in ball_of.items()}}

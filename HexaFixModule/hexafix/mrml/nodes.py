@@ -83,9 +83,8 @@ def remove(scene: Any, prefix: str) -> None:
     """Remove the nodes of a role and below it, with what displays, stores and lists them."""
     tree = scene.GetFirstNodeByClass("vtkMRMLSubjectHierarchyNode")
     for node in list(nodes_of(scene, prefix)):
-        item = tree.GetItemByDataNode(node) if tree is not None else 0
-        if item:
-            # Its item first: the tree looks its nodes up by address.
+        # Its item first: the tree looks its nodes up by address.
+        if tree is not None and (item := tree.GetItemByDataNode(node)):
             tree.RemoveItem(item, False, False)
         for part in parts_of(node):
             scene.RemoveNode(part)

@@ -19,7 +19,7 @@ from hexafix.imaging.file_geometry import FileGeometry, corners_mm, faults_of_gr
 from hexafix.imaging.fingerprint import fingerprint
 from hexafix.imaging.volume import Acquisition, ImageSource, Volume
 from hexafix.mrml.geometry import FLIP, array4, vtk4
-from hexafix.mrml.nodes import NAME, PREFIX, ROLE, slicer_core
+from hexafix.mrml.nodes import NAME, PREFIX, ROLE, nodes_of, slicer_core
 
 CONTENT = f"{PREFIX}content_sha256"
 AFFINE = f"{PREFIX}ijk_to_lps"
@@ -84,6 +84,17 @@ def _show_grey(scene: Any, node: Any) -> None:
     display.SetAndObserveColorNodeID("vtkMRMLColorTableNodeGrey")
     scene.AddNode(display)
     node.SetAndObserveDisplayNodeID(display.GetID())
+
+
+def adopt(scene: Any, node: Any) -> None:
+    """Make a volume of somebody else ours, to be saved in a bundle; its doubts stay with it."""
+    if node.GetAttribute(ROLE) == VOLUME_ROLE:
+        return
+    for other in nodes_of(scene, VOLUME_ROLE):
+        other.RemoveAttribute(ROLE)
+    node.SetAttribute(ROLE, VOLUME_ROLE)
+    node.SetAttribute(NAME, NAME_OF_VOLUME)
+    node.SetAttribute(AFFINE, json.dumps((FLIP @ _index_matrix(node)).tolist()))
 
 
 def set_window(node: Any, *, window_hu: float, level_hu: float) -> None:
