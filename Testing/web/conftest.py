@@ -78,9 +78,9 @@ def a_workstation_url(start_serving, a_case_on_disk):
     end(process)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def a_chromium():
-    """One Chromium for all pages."""
+    """One Chromium for a file's pages; while it runs, this thread has its event loop running."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +39,26 @@ def quiet_vtk() -> None:
 
     if not os.environ.get("HEXAFIX_DEBUG"):
         vtkObject.GlobalWarningDisplayOff()
+
+
+@contextmanager
+def rendered_once() -> Iterator[None]:
+    """Let trame render the page when it is whole.
+
+    It renders a container with all that is in it whenever its ``with`` ends, each widget some ten
+    times over: most of a second for our page.
+    """
+    from trame_client.widgets.core import HTML_CTX, AbstractElement
+
+    def leave(element: Any, *_: Any) -> None:
+        HTML_CTX.exit(element)
+
+    own = AbstractElement.__exit__
+    AbstractElement.__exit__ = leave  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        AbstractElement.__exit__ = own
 
 
 class Workstation:
@@ -116,7 +138,7 @@ class Workstation:
         from trame.widgets import html
         from trame.widgets import vuetify3 as v3
 
-        with VAppLayout(self.server, theme="dark") as self.ui:
+        with rendered_once(), VAppLayout(self.server, theme="dark") as self.ui:
             with v3.VAppBar(density="compact"):
                 self.panel.toolbar()
             with v3.VNavigationDrawer(permanent=True, width=470, location="left"):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import gc
 import os
 import signal
+import socket
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -51,8 +53,35 @@ def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> 
         Called once with the address to open.
     """
     prepare_environment()
+    require_free(access)
+    # Thousands of modules' objects live to the end: looking for garbage among them costs a tenth
+    # of the start.
+    gc.disable()
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(case, access, ready))
+
+
+def require_free(access: Access) -> None:
+    """Refuse an address that cannot be had, before anything is loaded for it."""
+    try:
+        family = socket.getaddrinfo(access.host, access.port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as trial:
+            if os.name == "posix":
+                trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((access.host, access.port))
+    except OSError as error:
+        raise address_not_free(access, error) from error
+
+
+def address_not_free(access: Access, error: OSError) -> InputError:
+    """The address may be taken, or not this machine's."""
+    return InputError.of(
+        "address-not-free",
+        f"the server cannot listen there: {error.strerror or 'the address is not ours'}",
+        value=f"{access.host}:{access.port}",
+        where="--port",
+        next_step="leave --host and --port out: any free port is taken",
+    )
 
 
 async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any]) -> None:
@@ -66,15 +95,23 @@ async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any])
     workstation = Workstation(presenter=presenter)
     server = workstation.server
     server.controller.on_server_bind.add(lambda bound: guard(bound, access, workstation))
-    server.controller.on_server_ready.add(lambda **_: ready(access.url(server.port)))
+    server.controller.on_server_ready.add(lambda **_: _started(ready, access.url(server.port)))
     running = asyncio.ensure_future(start(server, access))
     stopped = asyncio.ensure_future(stop.wait())
     try:
         await asyncio.wait({running, stopped}, return_when=asyncio.FIRST_COMPLETED)
         if running.done():
-            _why_it_ended(running, access)
+            running.result()
+    except OSError as error:
+        raise address_not_free(access, error) from error
     finally:
         await _end(workstation, running, stopped)
+
+
+def _started(ready: Callable[[str], Any], url: str) -> None:
+    gc.freeze()
+    gc.enable()
+    ready(url)
 
 
 def start(server: Any, access: Access) -> Any:
@@ -106,20 +143,6 @@ def guard(bound: Any, access: Access, workstation: Any) -> None:
     Guard(access, policy(text)).install(app)
     add_page(app, text)
     add_downloads(app, workstation.panel.downloads)
-
-
-def _why_it_ended(running: Any, access: Access) -> None:
-    """The address may not be ours to bind; anything else is a defect."""
-    try:
-        running.result()
-    except OSError as error:
-        raise InputError.of(
-            "address-not-free",
-            f"the server cannot listen there: {error.strerror or 'the address is not ours'}",
-            value=f"{access.host}:{access.port}",
-            where="--port",
-            next_step="leave --host and --port out: any free port is taken",
-        ) from error
 
 
 async def _end(workstation: Any, running: Any, stopped: Any) -> None:
