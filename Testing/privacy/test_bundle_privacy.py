@@ -1,9 +1,5 @@
 """No string of the input that could name a patient is in a scene bundle (H51)."""
 
-import os
-
-os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
-
 import re
 import zipfile
 
