@@ -22,7 +22,7 @@ def test_ruff_finds_no_fault(arguments):
 
 
 def test_no_committed_file_names_a_registry_or_an_address_of_a_lock():
-    for name in ("requirements.lock", "requirements-test.lock"):
+    for name in ("requirements.lock", "requirements-workstation.lock", "requirements-test.lock"):
         assert "://" not in (TOP / name).read_text()
 
 
