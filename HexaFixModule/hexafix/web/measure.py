@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import time
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ def measure(case: Path) -> dict[str, Any]:
         resampling, rendering and encoding took; ``view_px``: size of the view.
     """
     prepare_environment()
+    gc.disable()  # as `hexafix.web.run.serve` does
     return asyncio.run(_measure(case, time.perf_counter()))
 
 
