@@ -68,7 +68,7 @@ CONTROLS = {
 
 WIDTH_PX = 1200
 LIMIT_BYTES = 2_500_000
-ALL_S = 540
+ALL_S = 900
 """After so many seconds everything is ended, whatever it does."""
 
 FIGURE = re.compile(r"\d[\d.]* ?(?:mm|°|deg|days?|balls|pages|checks|HU|slices|voxels|%)")
@@ -92,12 +92,11 @@ def _palette(image: Any) -> Any:
     """Colours that keep also what is small: a strut's badge counts as much as a large face."""
     from PIL import Image
 
-    coarse = image.point(lambda value: value & 0xF8)
-    held = coarse.getcolors(1 << 15)
-    pixels = [colour for count, colour in held for _ in range(1 + round(count**0.5 / 4))]
+    held = image.getcolors(image.width * image.height)
+    pixels = [colour for count, colour in held for _ in range(1 + round(count**0.6 / 2))]
     strip = Image.new("RGB", (len(pixels), 1))
     strip.putdata(pixels)
-    return strip.quantize(256, Image.Quantize.MEDIANCUT, kmeans=3)
+    return strip.quantize(256, Image.Quantize.MEDIANCUT, kmeans=2)
 
 
 def page(folder: Path) -> str:
