@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 from hexafix.qt.kit import kit, need_display, views
@@ -28,4 +29,9 @@ def run_desktop(case: Path | None = None) -> int:
     window.show()
     if case is not None:
         window.open_case(case)
+    # Python looks at Ctrl-C only when it runs: the timer lets it, twice a second.
+    signal.signal(signal.SIGINT, lambda *_: window.main.close())
+    awake = q.QTimer()
+    awake.timeout.connect(lambda: None)
+    awake.start(500)
     return int(application.exec())
