@@ -262,9 +262,23 @@ def test_a_landmark_is_picked_by_a_click_in_a_view(a_planned_desk):
     a_planned_desk.click("set-correction")
     a_planned_desk.at("notice-error").get_by_text("landmark points are missing").wait_for()
     a_planned_desk.click("close-notice")
-    a_planned_desk.click("remove-pair-0")
-    a_planned_desk.click("kind-fragment-motion")
+    a_planned_desk.click("discard-correction")
     a_planned_desk.at("correction-pending").wait_for(state="detached")
+    assert a_planned_desk.at("form-motion").is_visible()
+
+
+def test_nothing_is_planned_while_a_typed_correction_is_not_set(a_planned_desk):
+    a_planned_desk.open("correction")
+    entry = a_planned_desk.at("draft-translation-2").locator("input")
+    shown = entry.input_value()
+    entry.fill("9.5")
+    a_planned_desk.at("correction-pending").wait_for()
+    a_planned_desk.click("run-all")
+    a_planned_desk.wait_for('[data-testid="notice-error"][data-code="correction-not-in-use"]')
+    a_planned_desk.wait("export", "done")
+    a_planned_desk.click("discard-correction")
+    a_planned_desk.at("correction-pending").wait_for(state="detached")
+    assert entry.input_value() == shown
 
 
 def test_a_reload_of_the_page_keeps_everything(a_planned_desk):

@@ -220,16 +220,56 @@ def a_context():
     )
 
 
-def test_a_refused_field_stays_marked_until_the_next_edit_and_then_shows_the_case(a_context):
-    def comma():
-        number("175,5", where="strut_readings_mm[1]")
+def comma():
+    number("175,5", where="strut_readings_mm[1]")
 
+
+def test_a_refused_field_stays_marked_until_its_text_is_taken(a_context):
     assert not a_context.act(comma, field="reading-2")
     assert a_context.data.field_errors["reading-2"].startswith("not taken")
     assert a_context.data.notice == {}
     assert a_context.act(lambda: None, field="reading-3")
+    assert "reading-2" in a_context.data.field_errors
+    assert a_context.act(lambda: None, field="reading-2")
     assert a_context.data.field_errors == {}
+
+
+def test_nothing_is_planned_while_a_field_shows_what_the_case_does_not_hold(a_context):
+    done = []
+    a_context.act(comma, field="reading-2")
+    assert not a_context.plan(lambda: done.append(1))
+    assert a_context.data.notice["code"] == "field-not-taken"
+    a_context.restore()
     assert a_context.data.field_keys["reading-2"] == 1
+    assert a_context.plan(lambda: done.append(2))
+    assert done == [2]
+
+
+def test_nothing_is_planned_while_a_part_of_the_panel_forbids_it(a_context):
+    def forbid():
+        raise InputError.of("correction-not-in-use", "typed and not set", hazard="H40")
+
+    done = []
+    a_context.before_planning.append(forbid)
+    assert not a_context.plan(lambda: done.append(1))
+    assert a_context.data.notice["hazard"] == "H40"
+    assert done == []
+
+
+@pytest.mark.parametrize(
+    ("can_export", "names"), [(True, {"plan.json", "manifest.json"}), (False, None)]
+)
+def test_no_file_is_handed_out_while_the_export_is_blocked(can_export, names):
+    from hexafix.web.panel import Panel
+    from trame.app import get_server
+
+    presenter = SimpleNamespace(
+        snapshot=SimpleNamespace(can_export=can_export),
+        prescription_files=lambda: {"plan.json": b"{}"},
+    )
+    server = get_server(f"downloads-{can_export}", client_type="vue3")
+    files = Panel(server, presenter, NoViews()).downloads()
+    assert files is None if names is None else set(files) == names
 
 
 def test_an_action_that_the_presenter_refused_marks_its_field(a_context):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from hexafix.errors import HexaFixError, InputError
@@ -33,6 +33,8 @@ class PanelContext:
         The state's values; setting one sends it to the browser.
     name : PanelState
         The state's names, for templates.
+    before_planning : list of callable
+        Each raises while what it watches forbids a plan.
     """
 
     server: Any
@@ -40,6 +42,18 @@ class PanelContext:
     controls: ViewControls
     data: PanelState
     name: PanelState
+    before_planning: list[Callable[[], None]] = field(default_factory=list)
+
+    def plan(self, work: Callable[[], Any]) -> bool:
+        """Do `work` that plans, unless something on screen is not what the case holds."""
+
+        def checked() -> Any:
+            self.require_taken()
+            for require in self.before_planning:
+                require()
+            return work()
+
+        return self.act(checked)
 
     def act(self, work: Callable[[], Any], *, field: str | None = None) -> bool:
         """Do `work`; an error is shown at `field`, or as a notice. Whether it was taken.
@@ -90,18 +104,35 @@ class PanelContext:
         }
 
     def forgive(self, field: str | None = None) -> None:
-        """Take back a notice and the marks of fields whose text was not taken.
-
-        Every marked field but `field` is built anew, so that it shows the document's value again.
-        """
+        """Take back the notice, and the mark of `field`, whose text was taken now."""
         self.data.notice = {}
-        marked = self.data.field_errors
-        if marked:
-            keys = dict(self.data.field_keys)
-            for name in marked:
-                keys[name] = keys.get(name, 0) + (name != field)
-            self.data.field_keys = keys
-            self.data.field_errors = {}
+        if field in self.data.field_errors:
+            errors = dict(self.data.field_errors)
+            del errors[field]
+            self.data.field_errors = errors
+
+    def restore(self) -> None:
+        """Build every marked field anew, so that it shows the document's value again."""
+        keys = dict(self.data.field_keys)
+        for name in self.data.field_errors:
+            keys[name] = keys.get(name, 0) + 1
+        self.data.field_keys, self.data.field_errors = keys, {}
+
+    def require_taken(self) -> None:
+        """Plan nothing while a field shows a text that the case does not hold.
+
+        Raises
+        ------
+        InputError
+            While a field is marked as not taken.
+        """
+        if self.data.field_errors:
+            raise InputError.of(
+                "field-not-taken",
+                "the text of a field was not taken: " + ", ".join(self.data.field_errors),
+                next_step="correct the marked field, or undo to see the case's values again",
+                hazard="H26",
+            )
 
 
 def typed_state(server: Any, kind: type[State]) -> tuple[State, State]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from hexafix.errors import InputError
 from hexafix.web.panel import draft as drafts
 from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.landmarks import Landmarks
@@ -51,6 +52,9 @@ class CorrectionStep:
         self._shown: Any = None
         self._set: Any = None
         self._centered = False
+        self._center: Sequence[float] | None = None
+        self.typed = False
+        context.before_planning.append(self.require_set)
         context.server.state.change(self._name.draft)(self._judge_draft)
 
     def build(self) -> None:
@@ -115,6 +119,13 @@ class CorrectionStep:
             icon="mdi-check",
             primary=True,
             disabled=(context.name.busy,),
+        )
+        button(
+            "Back to the case's values",
+            "discard-correction",
+            self._discard,
+            icon="mdi-restore",
+            v_if=name.pending,
         )
         table(
             context,
@@ -227,6 +238,7 @@ class CorrectionStep:
         center : sequence of float or None
             LPS, mm: the point between the fragments, taken as centre until another is written.
         """
+        self._center = center
         correction = snapshot.document.get("correction")
         new = dict(self._data.draft)
         if center is None and self._centered:
@@ -250,12 +262,13 @@ class CorrectionStep:
     def _judge_draft(self, **_: Any) -> None:
         """Say so where the fields hold something that the case does not."""
         held, draft = self._set, self._data.draft
+        self.typed = held is not None and self._differs(held, draft)
         if held is None:
             self._data.pending = ""
         elif draft["kind"] != held["kind"]:
             kind = drafts.KINDS[held["kind"]].lower()
             self._data.pending = f"Not set: the case holds a correction by {kind}."
-        elif draft != held or (draft["kind"] == "landmarks" and self._landmarks.changed):
+        elif self.typed:
             self._data.pending = "Not set: these values differ from those of the case."
         else:
             self._data.pending = ""
@@ -267,12 +280,44 @@ class CorrectionStep:
             self._landmarks.stop()
             self._context.controls.pick_point(None)
 
+    def _differs(self, held: Mapping[str, Any], draft: Mapping[str, Any]) -> bool:
+        """Whether something was typed that is not in the case; a look at another kind is not."""
+        return {**draft, "kind": held["kind"]} != held or self._landmarks.changed
+
+    def require_set(self) -> None:
+        """Plan nothing while the screen shows a correction that the case does not hold (H40).
+
+        Raises
+        ------
+        InputError
+            While something was typed that is not set.
+        """
+        if self.typed:
+            raise InputError.of(
+                "correction-not-in-use",
+                "a correction was typed that does not stand in the case",
+                where="correction",
+                next_step="press “Set the correction”, or “Back to the case's values”",
+                hazard="H40",
+            )
+
+    def _discard(self) -> None:
+        """Show the case's correction again."""
+        kept = {key: self._data.draft[key] for key in ("center", "origin")}
+        self._data.draft = {**drafts.empty(), **kept}
+        self._landmarks.clear()
+        self._shown = None
+        self.update(self._context.presenter.snapshot, self._center)
+
     def _apply(self) -> None:
         draft = self._data.draft
         make: Callable[[], Mapping[str, Any]] = lambda: drafts.to_document(draft)  # noqa: E731
         if draft["kind"] == "landmarks":
             make = lambda: self._landmarks.to_document(draft["moving"])  # noqa: E731
-        self._context.act(lambda: self._context.presenter.set_correction(dict(make())))
+        if self._context.act(lambda: self._context.presenter.set_correction(dict(make()))):
+            self._landmarks.hold()
+            self._set = dict(self._data.draft)
+            self._judge_draft()
 
     def _toggle_drag(self) -> None:
         self._data.dragging = not self._data.dragging

@@ -127,7 +127,7 @@ class ExportStep:
     def _run(self) -> None:
         from hexafix.presenter import Step
 
-        self._context.act(lambda: self._context.presenter.run(Step.EXPORT))
+        self._context.plan(lambda: self._context.presenter.run(Step.EXPORT))
 
     def _choose(self) -> None:
         def take(folder: Path) -> Any:

@@ -135,6 +135,16 @@ class Landmarks:
             "fixed_points_lps_mm": [pair["fixed"] for pair in whole],
         }
 
+    def hold(self) -> None:
+        """Take the pairs as those of the case."""
+        self._held = [dict(pair) for pair in self._points]
+
+    def clear(self) -> None:
+        """Forget the pairs."""
+        self.stop()
+        self._points, self._held = [], []
+        self._show()
+
     def stop(self) -> None:
         """Wait for no click any more."""
         self._data.picking = ""

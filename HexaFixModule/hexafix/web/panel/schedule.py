@@ -119,4 +119,4 @@ class ScheduleStep:
     def _run(self) -> None:
         from hexafix.presenter import Step
 
-        self._context.act(lambda: self._context.presenter.run(Step.SCHEDULE))
+        self._context.plan(lambda: self._context.presenter.run(Step.SCHEDULE))

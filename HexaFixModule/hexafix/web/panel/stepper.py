@@ -79,4 +79,4 @@ class Stepper:
     def _go(self, step: str) -> None:
         from hexafix.presenter import Step
 
-        self._context.act(lambda: self._context.presenter.go_to(Step(step)))
+        self._context.presenter.go_to(Step(step))

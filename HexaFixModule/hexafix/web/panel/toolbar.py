@@ -69,7 +69,7 @@ class Toolbar:
         button(
             "Plan all steps",
             "run-all",
-            self._context.presenter.run_all,
+            self._run_all,
             icon="mdi-play",
             primary=True,
             v_if=f"!{name.busy}",
@@ -98,16 +98,21 @@ class Toolbar:
             v_if=name.busy,
         )
 
+    def _run_all(self) -> None:
+        self._context.plan(self._context.presenter.run_all)
+
     def undo(self) -> None:
         """Take the last edit back."""
         context = self._context
         if context.presenter.snapshot.can_undo:
+            context.restore()
             context.act(context.presenter.undo)
 
     def redo(self) -> None:
         """Make the edit again that was taken back."""
         context = self._context
         if context.presenter.snapshot.can_redo:
+            context.restore()
             context.act(context.presenter.redo)
 
     def open_case(self) -> None:
@@ -116,7 +121,11 @@ class Toolbar:
 
     def new_case(self) -> None:
         """Start with an empty case, and before that ask whether unsaved edits may be lost."""
-        self._unless_unsaved(lambda: self._context.act(self._context.presenter.new_case))
+        self._unless_unsaved(self._new)
+
+    def _new(self) -> None:
+        self._context.restore()
+        self._context.act(self._context.presenter.new_case)
 
     def _unless_unsaved(self, work: Callable[[], Any]) -> None:
         self._then = work
@@ -143,6 +152,7 @@ class Toolbar:
         from hexafix.presenter import Step, StepState
 
         context = self._context
+        context.restore()
         if context.act(lambda: context.presenter.open_case(path)):
             view = context.presenter.snapshot.view(Step.LOAD)
             if view.state == StepState.READY:
