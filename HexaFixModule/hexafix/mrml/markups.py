@@ -36,8 +36,8 @@ LISTS = {
 
 UNNUMBERED_COLOUR, REJECTED_COLOUR = (0.85, 0.10, 0.38), (0.55, 0.55, 0.55)
 
-SELECTED_COLOUR = (1.0, 0.92, 0.0)
-"""A ball that is chosen in a table or view."""
+SELECTED_COLOUR = (0.0, 0.38, 1.0)
+"""A ball that is chosen in a table or view; its number stays legible on the white label."""
 
 LANDMARK_COLOURS = {"moving": (0.20, 0.62, 0.30), "fixed": (0.13, 0.35, 0.72)}
 
