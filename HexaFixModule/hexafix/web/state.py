@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from hexafix.panel.text import text_of
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot, Table
@@ -183,10 +184,7 @@ def _banner_words(banner: Any) -> dict[str, Any]:
 
 def number_words(value: float | None) -> str:
     """A number of the document as a field shows it: every digit, a point, nothing rounded."""
-    if value is None:
-        return ""
-    text = json.dumps(value)
-    return text.removesuffix(".0")
+    return text_of(value)
 
 
 NUMBERS_OF_SCHEDULE = (
