@@ -176,10 +176,16 @@ def codes_of(tree: ast.Module) -> set[str]:
             at = _CODE_ARGUMENT.get(name or "", len(node.args))
             values = [*node.args[at : at + 1], *(k.value for k in node.keywords if k.arg == "code")]
             found.update(text for value in values for text in _texts(value))
-        elif isinstance(node, ast.Tuple) and len(node.elts) >= 4:
-            # rows of a table of faults begin with the code
+        elif isinstance(node, ast.Tuple) and _is_fault_row(node):
             found.update(text for text in _texts(node.elts[0]) if "-" in text)
     return {text for text in found if CODE.fullmatch(text)}
+
+
+def _is_fault_row(row: ast.Tuple) -> bool:
+    """Rows of a table of faults begin with the code and go on with a sentence."""
+    if len(row.elts) < 4:
+        return False
+    return not any("-" in text and CODE.fullmatch(text) for text in _texts(row.elts[1]))
 
 
 def _texts(node: ast.expr) -> list[str]:

@@ -104,6 +104,7 @@ def test_codes_are_found_however_a_fault_is_made(hazard_table):
         'Fault("one-code", "w"); Error.of("two", "w"); Gate("G1", f"three-{x}", "n")\n'
         'at_most("G2", "four-a" if x else "four-b", "n"); Fault(code="five")\n'
         'rows = [("six-code", "w", "H03", "limit")]\n'
+        'kinds = ("no-fault", "no-fault-either", "a", "b")\n'
         'text = "no-code"'
     )
     codes = hazard_table.codes_of(tree)

@@ -9,7 +9,7 @@ from typing import Any
 
 from hexafix.errors import Fault, InputError
 
-NUMBER = re.compile(r"[+-]?[0-9]{1,7}(\.[0-9]{1,15})?")
+NUMBER = re.compile(r"[+-]?[0-9]{1,6}(\.[0-9]{1,15})?")
 
 
 def number_of(text: str, name: str) -> float:

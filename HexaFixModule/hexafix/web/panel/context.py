@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from hexafix.errors import HexaFixError, InputError
+from hexafix.panel.text import NUMBER
 from hexafix.web.panel.controls import ViewControls
 from hexafix.web.state import NAMESPACE
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from hexafix.web.state import PanelState
 
 State = TypeVar("State")
-
-_NUMBER = re.compile(r"[+-]?[0-9]{1,6}(\.[0-9]{1,9})?")
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ def number(text: Any, *, where: str) -> float:
         If the text is not a plain number (H26).
     """
     text = str("" if text is None else text).strip().replace("−", "-")
-    if not _NUMBER.fullmatch(text):
+    if not NUMBER.fullmatch(text):
         raise InputError.of(
             "not-a-number",
             "this is not a plain number",
