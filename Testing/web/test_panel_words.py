@@ -10,6 +10,7 @@ from hexafix.web.files import CASE_SUFFIXES, IMAGE_SUFFIXES, MOST_ENTRIES, listi
 from hexafix.web.panel import draft as drafts
 from hexafix.web.panel.context import PanelContext, number, whole_number
 from hexafix.web.panel.controls import NoViews
+from hexafix.web.panel.numbering import ring_words
 from hexafix.web.panel.playback import turn_words, when_words
 from hexafix.web.panel.widgets import marked
 from hexafix.web.state import (
@@ -95,6 +96,13 @@ def test_a_turn_is_told_by_a_word_and_an_arrow_without_sign():
     assert turn_words(0.5, "0.5") == {"turn": "0.5", "way": "longer", "arrow": "▲"}
     assert turn_words(-1.0, "1.0") == {"turn": "1.0", "way": "shorter", "arrow": "▼"}
     assert turn_words(0.0, "0.0") == {"turn": "", "way": "no turn", "arrow": ""}
+
+
+@pytest.mark.parametrize(("far", "words"), [(17.78, "17.8 mm"), (0.047, "0.047 mm")])
+def test_a_numbering_that_is_far_is_told_by_a_tenth_of_a_millimetre(far, words):
+    found = {"markers": 4, "assigned": 4, "rms_mm": 0.0466, "next_best_mm": far}
+    told = ring_words(found)
+    assert told == f"4 of 4 numbered · RMS 0.047 mm · next best numbering {words}"
 
 
 def test_the_day_leads_and_today_is_told_apart():

@@ -164,6 +164,24 @@ def test_the_3d_view_shows_frame_bone_and_balls_and_hides_what_it_is_told(a_work
     assert min(changed.values()) > 300
 
 
+def test_the_3d_view_takes_all_in_when_the_balls_and_when_the_rings_come(monkeypatch):
+    from types import SimpleNamespace
+
+    from hexafix.presenter import Step
+    from hexafix.web.views import Views
+
+    values, taken_in = {}, []
+    views = Views.__new__(Views)
+    views._presenter, views._volume, views._framed = SimpleNamespace(value=values.get), None, 0
+    monkeypatch.setattr(views, "reset_space", lambda: taken_in.append(set(values)))
+    views.update(None)
+    for step in (Step.MARKERS, Step.NUMBERING, Step.POSES, Step.SCHEDULE):
+        values[step] = object()
+        views.update(None)
+    found = {Step.MARKERS}
+    assert taken_in == [found, {*found, Step.NUMBERING, Step.POSES}]
+
+
 def test_the_patient_is_seen_from_the_front_with_the_head_up(a_workstation, a_view):
     for view in a_workstation.app.view_manager.get_threed_views():
         view.reset_view()

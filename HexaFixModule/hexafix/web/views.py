@@ -64,7 +64,7 @@ class Views:
         self._picked: Callable[[Sequence[float]], None] | None = None
         self._placing = self._dragging_fragment = False
         self._volume: Any = None
-        self._framed = False
+        self._framed = 0
         self._state.update({"views_layout": FOUR, "views_hint": "", "views_loaded": False})
         self.window = WindowLevel(server)
         register_factories(app.view_manager, server)
@@ -112,8 +112,9 @@ class Views:
         if volume is not self._volume:
             self._volume = volume
             self._show_volume(volume)
-        framed = self._presenter.value(Step.POSES) is not None
-        if framed and not self._framed:
+        values = [self._presenter.value(step) for step in (Step.MARKERS, Step.POSES)]
+        framed = len([value for value in values if value is not None])
+        if framed > self._framed:
             self.reset_space()
         self._framed = framed
 
@@ -279,5 +280,5 @@ def prepare_space(view: Any) -> None:
 
     node: Any = slicer.vtkMRMLAbstractViewNode  # type: ignore[attr-defined]
     view.renderer().SetUseDepthPeeling(False)
-    view.set_orientation_marker(node.OrientationMarkerTypeCube, node.OrientationMarkerSizeMedium)
+    view.set_orientation_marker(node.OrientationMarkerTypeCube, node.OrientationMarkerSizeSmall)
     view.set_box_visible(False)

@@ -88,12 +88,19 @@ def _shown() -> None:
     with v3.VBtnToggle(
         v_model=("views_shown", list(SHOWN)),
         multiple=True,
+        color="primary",
         density="compact",
         variant="outlined",
         divided=True,
     ):
         for name, words in SHOWN.items():
-            v3.VBtn(words, value=name, size="small", raw_attrs=[f'data-testid="show-{name}"'])
+            v3.VBtn(
+                words,
+                value=name,
+                size="small",
+                classes="text-none",
+                raw_attrs=[f'data-testid="show-{name}"'],
+            )
 
 
 def _connect(views: Views, state: Any) -> None:
