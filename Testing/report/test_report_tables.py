@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hexafix.errors import HexaFixError
 from hexafix.report.format import (
+    format_margin,
     format_measure,
     format_number,
     format_reading,
@@ -68,6 +69,13 @@ def test_numbers_never_show_a_negative_zero_and_keep_their_zeros():
     assert format_measure(2.2e-16) == "2.2e-16"
     assert format_measure(0.0) == "0"
     assert format_measure(None) == "-"
+
+
+@pytest.mark.parametrize(
+    ("margin", "text"), [(17.78, "17.8"), (25.926, "25.9"), (4.96, "4.960"), (0.0, "0.000")]
+)
+def test_a_margin_has_hundredths_only_where_a_limit_is_near(margin, text):
+    assert format_margin(margin) == text
 
 
 def test_the_markups_hold_every_ball_with_number_place_and_ring(a_plan):

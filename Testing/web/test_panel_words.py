@@ -98,7 +98,7 @@ def test_a_turn_is_told_by_a_word_and_an_arrow_without_sign():
     assert turn_words(0.0, "0.0") == {"turn": "", "way": "no turn", "arrow": ""}
 
 
-@pytest.mark.parametrize(("far", "words"), [(17.78, "17.8 mm"), (0.047, "0.047 mm")])
+@pytest.mark.parametrize(("far", "words"), [(17.78, "17.8 mm"), (4.96, "4.960 mm")])
 def test_a_numbering_that_is_far_is_told_by_a_tenth_of_a_millimetre(far, words):
     found = {"markers": 4, "assigned": 4, "rms_mm": 0.0466, "next_best_mm": far}
     told = ring_words(found)

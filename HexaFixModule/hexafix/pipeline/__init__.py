@@ -49,6 +49,7 @@ from hexafix.pipeline.scenery import (
 from hexafix.pipeline.text import (
     format_change,
     format_deg,
+    format_margin,
     format_measure,
     format_mm,
     format_number,
@@ -75,6 +76,7 @@ __all__ = [
     "find_markers",
     "format_change",
     "format_deg",
+    "format_margin",
     "format_measure",
     "format_mm",
     "format_number",

@@ -3,6 +3,7 @@
 from hexafix.report.format import (
     format_change,
     format_deg,
+    format_margin,
     format_measure,
     format_mm,
     format_number,
@@ -14,6 +15,7 @@ from hexafix.report.format import (
 __all__ = [
     "format_change",
     "format_deg",
+    "format_margin",
     "format_measure",
     "format_mm",
     "format_number",

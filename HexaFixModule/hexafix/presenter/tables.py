@@ -14,6 +14,12 @@ def _mm(value: float | None) -> str:
     return "-" if value is None else format_mm(value)
 
 
+def _margin(value: float | None) -> str:
+    from hexafix.pipeline import format_margin
+
+    return "-" if value is None else format_margin(value)
+
+
 def _deg(value: float | None) -> str:
     from hexafix.pipeline import format_deg
 
@@ -199,7 +205,7 @@ def layout(document: Mapping[str, Any]) -> Table:
                 ring,
                 "/".join(_measure(angle) for angle in found["included_angles_deg"]),
                 found["rule"],
-                _mm(found["uniqueness_mm"]),
+                _margin(found["uniqueness_mm"]),
                 _mm(found["predicted_error_mm"]),
                 _deg(found["predicted_error_deg"]),
             )

@@ -18,6 +18,9 @@ POSITION_DIGITS = 3
 ANGLE_DIGITS = 3
 """Decimals of angles and their sigma, degrees."""
 
+FAR_MM = 10.0
+"""Another numbering that misses by so much cannot be meant, and hundredths of it mean nothing."""
+
 OFF_STEP_LIMIT = 1e-6
 """Farthest a strut value may lie from a multiple of the strut's step, mm."""
 
@@ -39,6 +42,11 @@ def format_number(value: float, digits: int) -> str:
 def format_mm(value: float) -> str:
     """A position or distance, mm, three decimals."""
     return format_number(value, POSITION_DIGITS)
+
+
+def format_margin(value: float) -> str:
+    """How far off something else is, mm: a tenth where it is far, all decimals near a limit."""
+    return format_number(value, 1) if abs(value) >= FAR_MM else format_mm(value)
 
 
 def format_deg(value: float) -> str:

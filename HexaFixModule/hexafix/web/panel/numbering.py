@@ -200,7 +200,7 @@ class NumberingStep:
 
 def ring_words(found: Mapping[str, Any] | None) -> str:
     """How well a ring's numbers fit, and how far the next best numbering is."""
-    from hexafix.pipeline.text import format_mm
+    from hexafix.pipeline.text import format_margin, format_mm
 
     if not found:
         return ""
@@ -208,15 +208,8 @@ def ring_words(found: Mapping[str, Any] | None) -> str:
     if found.get("rms_mm") is not None:
         words += f" · RMS {format_mm(found['rms_mm'])} mm"
     if found.get("next_best_mm") is not None:
-        words += f" · next best numbering {far_words(found['next_best_mm'])} mm"
+        words += f" · next best numbering {format_margin(found['next_best_mm'])} mm"
     return words
-
-
-def far_words(distance_mm: float) -> str:
-    """A distance that only has to be far: a tenth of a millimetre from 1 mm on."""
-    from hexafix.pipeline.text import format_mm, format_number
-
-    return format_number(distance_mm, 1) if distance_mm >= 1.0 else format_mm(distance_mm)
 
 
 def _residuals(snapshot: Snapshot) -> dict[str, str]:
