@@ -23,7 +23,7 @@ WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 1000, "height": 700}
 HIGH = {"width": 1000, "height": 860}
 """Sizes of the browser's window, CSS pixels."""
 
-SCALE = 1.5
+SCALE = 1.2
 """Pixels of a picture for one of them."""
 
 LONG_MS = 60_000
