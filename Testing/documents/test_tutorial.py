@@ -187,7 +187,54 @@ def test_a_picture_missing_left_over_or_too_large_is_told(make, a_copy):
     assert any("bytes of pictures" in fault for fault in make.faults(a_copy))
 
 
-def test_a_screen_that_differs_from_the_plan_stops_the_run(run):
+def a_plan_of(figures):
+    """As much of plan.json as the run compares, with exactly what the screen says."""
+    number = {
+        name: float(words)
+        for name, words in figures.items()
+        if words[:1].isdigit() and re.fullmatch(r"[\d.]+", words)
+    }
+    day, adjustment = int(number["when_day"]), int(number["when_adjustment"])
+    sign = 1 if figures["when_way"] == "longer" else -1
+    now = number["when_strut_1"]
+    rows = [
+        {"day": day, "adjustment": adjustment - 1, "strut_mm": [now - sign * number["when_turn"]]},
+        {"day": day, "adjustment": adjustment, "strut_mm": [now]},
+    ]
+    widths = [number["diameter_min"], number["diameter_max"]]
+    widths += [number["diameter_max"]] * (int(number["balls"]) - 2)
+    return {
+        "balls": [{"diameter_mm": width} for width in widths],
+        "rejected": [{}] * int(number["rejected"]),
+        "rings": {name: {"rms_mm": number[f"rms_{name}"]} for name in ("proximal", "distal")},
+        "mechanism": {"difference": {"struts_mm": [-number["strut_difference"], 0.0]}},
+        "correction": {"target": {"position_mm": [0.0, 0.0, number["target_z"]]}},
+        "schedule": {
+            "rows": rows,
+            "days": int(number["days"]),
+            "adjustments_per_day": int(number["adjustments"]),
+        },
+    }
+
+
+COMPARED = (
+    *("balls", "rejected", "diameter_min", "diameter_max", "rms_proximal", "rms_distal"),
+    *("strut_difference", "target_z", "days", "adjustments", "when_strut_1", "when_turn"),
+)
+
+
+@pytest.mark.parametrize("name", [*COMPARED, "when_way"])
+def test_a_screen_that_differs_from_the_plan_stops_the_run(make, run, name):
+    figures = make.figures(DOCUMENTS)
+    plan = a_plan_of(figures)
+    run.compare(figures, plan)
+    other = {"longer": "shorter", "shorter": "longer"}.get(figures[name])
+    digits = len(figures[name].partition(".")[2])
+    with pytest.raises(SystemExit, match=name):
+        run.compare({**figures, name: other or f"{float(figures[name]) + 1:.{digits}f}"}, plan)
+
+
+def test_a_figure_is_compared_to_the_digits_that_are_shown(run):
     assert run.shows("0.047", 0.046526)
     assert run.shows("22", 22)
     assert not run.shows("0.048", 0.046526)
