@@ -6,8 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hexafix import pipeline
+from hexafix.errors import InputError, Refused
 from hexafix.geometry import Pose
-from hexafix.mrml import SceneSync, markups, parameter_node, transforms
+from hexafix.mrml import (
+    HeadlessMrmlApp,
+    SceneLogic,
+    SceneSync,
+    bundle,
+    markups,
+    parameter_node,
+    transforms,
+)
 from hexafix.mrml.nodes import find
 from hexafix.mrml.tables import table_rows
 from hexafix.presenter import Presenter, Step
@@ -204,6 +213,54 @@ def test_playback_shows_the_plans_rows(sync, logic, presenter):
     sync.show_playback_row(None)
     pose = presenter.value(Step.POSES).proximal.pose.matrix
     np.testing.assert_allclose(transforms.motion_lps(node), pose, atol=1e-9)
+
+
+def place_of(scene, role):
+    matrix = find(scene, role).GetMatrixTransformToParent()
+    return [matrix.GetElement(i, j) for i in range(4) for j in range(4)]
+
+
+def test_a_saved_scene_shows_the_frame_as_the_ct_does_whatever_is_played(
+    sync, presenter, logic, tmp_path
+):
+    presenter.run(Step.SCHEDULE)
+    ring = transforms.RING["proximal"]
+    in_the_ct = place_of(logic.scene, ring)
+    sync.show_playback_row(5)
+    played = place_of(logic.scene, ring)
+    sync.save_bundle(tmp_path / "scene.mrb")
+    assert place_of(logic.scene, ring) == played != in_the_ct
+    with HeadlessMrmlApp() as app:
+        opened = SceneLogic(app.scene)
+        opened.open_bundle(tmp_path / "scene.mrb")
+        np.testing.assert_allclose(place_of(app.scene, ring), in_the_ct, atol=1e-9)
+        assert opened.case_document_from_scene() == logic.case_document_from_scene()
+
+
+def test_a_scene_with_older_results_is_not_saved_until_the_edit_is_undone(
+    sync, presenter, tmp_path
+):
+    presenter.run(Step.SCHEDULE)
+    older = (tmp_path / "scene.mrb").write_bytes(b"older")
+    presenter.set_reading(2, 171.5)
+    with pytest.raises(Refused) as refused:
+        sync.save_bundle(tmp_path / "scene.mrb")
+    fault = refused.value.faults[0]
+    assert (fault.code, fault.hazard) == ("scene-out-of-date", "H40")
+    assert "Schedule" in fault.what
+    assert (tmp_path / "scene.mrb").stat().st_size == older
+    presenter.undo()
+    sync.save_bundle(tmp_path / "scene.mrb")
+    assert (tmp_path / "scene.mrb").stat().st_size > older
+
+
+def test_a_scene_that_mrml_cannot_write_is_told_as_not_written(sync, tmp_path, monkeypatch):
+    monkeypatch.setattr(bundle, "EXTENSIONS", {"vtkMRMLModelNode": ".of-no-known-kind"})
+    sync.presenter.run(Step.MARKERS)
+    with pytest.raises(InputError) as refused:
+        sync.save_bundle(tmp_path / "scene.mrb")
+    assert refused.value.faults[0].code == "bundle-not-written"
+    assert not (tmp_path / "scene.mrb").exists()
 
 
 def test_a_new_case_empties_the_scene(sync, logic, presenter):

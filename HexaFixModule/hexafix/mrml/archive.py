@@ -64,12 +64,17 @@ def pack(folder: Path, target: Path) -> None:
         if beside is not None:
             with contextlib.suppress(OSError):
                 beside.unlink()
-        raise InputError.of(
-            "bundle-not-written",
-            f"the scene bundle could not be written: {getattr(error, 'strerror', None) or error}",
-            hazard="H46",
-            next_step="free disk space or choose another file; an older one is unchanged",
-        ) from error
+        raise not_written(getattr(error, "strerror", None) or str(error)) from error
+
+
+def not_written(why: str) -> InputError:
+    """H46: nothing was written, and an older bundle is as it was."""
+    return InputError.of(
+        "bundle-not-written",
+        f"the scene bundle could not be written: {why}",
+        hazard="H46",
+        next_step="free disk space or choose another file; an older one is unchanged",
+    )
 
 
 def _write_entries(stream: BinaryIO, folder: Path, files: list[Path]) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 from hexafix.errors import Refused
 from hexafix.mrml import hierarchy
 from hexafix.mrml.app import HeadlessMrmlApp
-from hexafix.mrml.archive import pack, unpack
+from hexafix.mrml.archive import not_written, pack, unpack
 from hexafix.mrml.bundle_content import NEXT_STEP, SCENE_FILE, check_content
 from hexafix.mrml.markups import ROWS
 from hexafix.mrml.nodes import ROLE, nodes_of, remove
@@ -60,7 +60,7 @@ def save_bundle(scene: Any, path: Path) -> None:
             _write(node, top / "Data" / role.replace("/", "-"))
         app.scene.SetURL(str(top / SCENE_FILE))
         if not app.scene.Commit():
-            raise RuntimeError("MRML could not write its scene")
+            raise not_written("no room for its scene file")
         pack(Path(work), Path(path))
 
 
@@ -78,7 +78,7 @@ def _write(node: Any, stem: Path) -> None:
     storage.SetUseCompression(extension != ".vtp")
     storage.SetFileName(f"{stem}{extension}")
     if not storage.WriteData(node):
-        raise RuntimeError(f"MRML could not write a {extension} file")
+        raise not_written(f"no room for its {extension} files")
 
 
 def open_bundle(scene: Any, path: Path) -> None:

@@ -6,8 +6,10 @@ Shared by the browser workstation and the panel in desktop Slicer.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.errors import Refused
 from hexafix.markers import BallSet
 from hexafix.mrml import markups
 from hexafix.mrml import transforms as places
@@ -22,6 +24,11 @@ if TYPE_CHECKING:
 
 DRAGGED = ("proximal", "distal", "unnumbered")
 """Lists whose points the user may drag."""
+
+IN_THE_SCENE = (
+    *(Step.LOAD, Step.MARKERS, Step.NUMBERING, Step.POSES, Step.CORRECTION, Step.SCHEDULE),
+)
+"""Steps whose results are shown in the scene."""
 
 SAME_MOTION = 1e-9
 """Two motions are the same below this, in mm and in entries of the rotation."""
@@ -46,6 +53,7 @@ class SceneSync:
         self._shown: dict[str, tuple[Any, ...]] = {}
         self._samples: dict[str, BoneSample] = {}
         self._rows: Any = None
+        self._row: int | None = None
         self._updating = False
         self._dragging_target = False
         self._observers: list[tuple[Any, int]] = []
@@ -77,8 +85,52 @@ class SceneSync:
 
     def show_playback_row(self, index: int | None) -> None:
         """Show a row of the plan's schedule; None: where the CT shows frame and bone."""
+        self._row = index
         playback = None if index is None else self._playback()
         self.logic.show_playback_row(playback, index if playback is not None else None)
+
+    def save_bundle(self, path: Path) -> None:
+        """Save the scene, with frame and bone where the CT shows them.
+
+        Parameters
+        ----------
+        path : Path
+            The file, ``.mrb``.
+
+        Raises
+        ------
+        Refused
+            While the scene shows what is not of the case that is saved with it (H40): a file
+            tells nobody what was grey.
+        InputError
+            If it cannot be written; an older file is left as it was.
+        """
+        older = self._out_of_date()
+        if older:
+            raise Refused.of(
+                "scene-out-of-date",
+                f"the scene was not saved: {older}",
+                hazard="H40",
+                next_step="plan all steps, or undo the edit, then save again",
+            )
+        shown = self._row
+        self.show_playback_row(None)
+        try:
+            self.logic.save_bundle(path)
+        finally:
+            self.show_playback_row(shown)
+
+    def _out_of_date(self) -> str:
+        """What of the scene is not of the present case, in words; empty if all is."""
+        presenter = self.presenter
+        if presenter.snapshot.busy:
+            return "work is under way"
+        older = [
+            presenter.snapshot.view(step).title
+            for step in IN_THE_SCENE
+            if presenter.value(step) is not None and not presenter.is_fresh(step)
+        ]
+        return "out of date: " + ", ".join(older) if older else ""
 
     def _playback(self) -> Any:
         """The playback of the shown plan, computed once."""
@@ -135,6 +187,7 @@ class SceneSync:
             for group in ("frame", "bone", "target"):
                 self.logic.clear(group)
         else:
+            self._row = None
             self.logic.show_recognised(self.presenter.inputs.case_for(Step.POSES), recognised)
         return True
 
