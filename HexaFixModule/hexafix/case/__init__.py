@@ -10,6 +10,7 @@ from hexafix.case.read import (
     load_raw_case,
 )
 from hexafix.case.rings import Rings, load_rings
+from hexafix.hardware.definition import shipped_fixator_names
 
 __all__ = [
     "Case",
@@ -25,4 +26,5 @@ __all__ = [
     "load_rings",
     "partial_case",
     "parts_of",
+    "shipped_fixator_names",
 ]

@@ -4,6 +4,7 @@ from hexafix.hardware.definition import (
     fixator_from_document,
     read_fixator,
     shipped_fixator,
+    shipped_fixator_names,
     shipped_fixators,
 )
 from hexafix.hardware.fixator import Fixator, Ring, StrutType
@@ -23,5 +24,6 @@ __all__ = [
     "places_from_document",
     "read_fixator",
     "shipped_fixator",
+    "shipped_fixator_names",
     "shipped_fixators",
 ]

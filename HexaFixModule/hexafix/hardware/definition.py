@@ -32,6 +32,11 @@ def shipped_fixators() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (resources() / "Hardware" / "Frames").glob("*.json")))
 
 
+def shipped_fixator_names() -> dict[str, str]:
+    """What each shipped definition is called, by its id."""
+    return {known: shipped_fixator(known).name for known in shipped_fixators()}
+
+
 def shipped_fixator(fixator_id: str = "generic-6sps-160") -> Fixator:
     """A fixator that comes with HexaFix.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from hexafix.errors import InputError
 
 CASE_SUFFIXES = (".json",)
+SCENE_SUFFIXES = (".mrb",)
 IMAGE_SUFFIXES = (".nrrd", ".nii.gz", ".nii", ".mha")
 
 MOST_ENTRIES = 500

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from hexafix.web.files import IMAGE_SUFFIXES, start_folder
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext, typed_state
+from hexafix.web.panel.frame_choice import FrameChoice
 from hexafix.web.panel.widgets import button, choice, marked, note, table, title
 from hexafix.web.panel.widgets import field as text_field
 
@@ -40,6 +41,7 @@ class LoadStep:
     def __init__(self, context: PanelContext, chooser: Chooser) -> None:
         self._context, self._chooser = context, chooser
         self._data, self._name = typed_state(context.server, LoadState)
+        self._frame = FrameChoice(context, chooser)
 
     def build(self) -> None:
         """Make the step's fields and tables."""
@@ -48,10 +50,11 @@ class LoadStep:
         context, form = self._context, self._context.name.form
         with html.Div(classes="hxp-grid-2"):
             text_field(context, "case-id", "Case id (no patient name)", f"{form}.case_id", self._id)
-            text_field(context, "fixator", "Frame (id or file)", f"{form}.fixator", self._fixator)
+            self._frame.build()
             sides = ("[{title: 'left', value: 'left'}, {title: 'right', value: 'right'}]",)
             choice(context, "limb-side", "Side", f"{form}.side", sides, self._side)
             choice(context, "limb-bone", "Bone", f"{form}.bone", ([*BONES],), self._bone)
+        self._frame.build_file()
         title("CT")
         self._image()
         table(
@@ -92,6 +95,7 @@ class LoadStep:
 
     def update(self, form: Mapping[str, Any], snapshot: Snapshot) -> None:
         """Show the document's image path where another one is not being written."""
+        self._frame.update(snapshot)
         table = snapshot.tables.get("series")
         listed = list(zip(table.rows, table.alerts, strict=True)) if table else []
         self._data.uids = ["" if alert else row[-1] for row, alert in listed]
@@ -102,9 +106,6 @@ class LoadStep:
 
     def _id(self, text: str) -> None:
         self._set("case-id", lambda: self._context.presenter.set_case_id(text.strip()))
-
-    def _fixator(self, text: str) -> None:
-        self._set("fixator", lambda: self._context.presenter.set_fixator(text.strip()))
 
     def _side(self, side: str) -> None:
         self._set("limb-side", lambda: self._context.presenter.set_limb(side=side))
