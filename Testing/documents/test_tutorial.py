@@ -56,7 +56,11 @@ def texts(room):
     """Every text of a room's sources; in a made one, `\\0` stands for what is put in."""
     held = []
     for path in sorted((PACKAGE / room).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        told = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
+            if id(node) in told:
+                continue
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 held.append(node.value)
             elif isinstance(node, ast.JoinedStr):
@@ -90,7 +94,8 @@ def test_the_page_is_whole(make):
 def test_every_control_named_exists_in_the_panel(make):
     web = texts("web")
     for words, name in make.CONTROLS.items():
-        assert any(words in text for text in web) or is_made(f"download-{words}"), words
+        # the page itself makes a capital of "undo"
+        assert any(words in text or words.lower() == text for text in web), words
         assert name is None or is_made(name), name
     assert not is_made("run-everything-else")
 
