@@ -191,6 +191,43 @@ def test_the_prescription_is_shown_page_by_page(a_planned_desk):
     assert "Page 2 of" in a_planned_desk.at("page-words").inner_text()
 
 
+def save_scene(desk, path):
+    desk.click("save-scene")
+    desk.at("chooser-path").locator("input").fill(str(path))
+    desk.click("chooser-accept")
+
+
+def test_a_saved_scene_opens_as_it_was_planned_and_is_replaced_only_when_asked(
+    a_planned_desk, tmp_path
+):
+    from hexafix.mrml import HeadlessMrmlApp, SceneLogic, open_bundle
+    from hexafix.mrml.nodes import find
+    from hexafix.mrml.tables import table_rows
+
+    path = tmp_path / "tibia.mrb"
+    save_scene(a_planned_desk, tmp_path / "tibia")
+    a_planned_desk.at("scene-saved").wait_for(timeout=LONG_MS)
+    assert a_planned_desk.at("scene-saved").inner_text() == f"The scene is saved: {path}"
+    with HeadlessMrmlApp() as app:
+        open_bundle(app.scene, path)
+        case = SceneLogic(app.scene).case_document_from_scene()
+        rows = table_rows(find(app.scene, "table/struts"))
+        assert SceneLogic(app.scene).volume_node() is not None
+    given = json.loads(a_planned_desk.case.read_text())
+    assert case["strut_readings_mm"] == given["strut_readings_mm"]
+    assert float(rows[1][3]) == pytest.approx(given["strut_readings_mm"][0])
+    first = path.stat().st_ino
+    save_scene(a_planned_desk, path)
+    a_planned_desk.click("replace-keep")
+    assert path.stat().st_ino == first
+    a_planned_desk.click("close-scene-line")
+    save_scene(a_planned_desk, path)
+    a_planned_desk.click("replace-go-on")
+    a_planned_desk.at("scene-saved").wait_for(timeout=LONG_MS)
+    assert path.stat().st_ino != first
+    a_planned_desk.click("close-scene-line")
+
+
 def test_an_edit_greys_the_results_and_blocks_the_export_until_undone(a_planned_desk):
     a_planned_desk.open("schedule")
     a_planned_desk.write("schedule-max_rate_mm_per_day", "0.5")

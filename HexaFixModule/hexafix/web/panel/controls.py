@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Protocol
 
 
@@ -39,6 +40,10 @@ class ViewControls(Protocol):
         """Show landmark points (LPS, mm, n rows of 3 each)."""
         ...
 
+    def save_scene(self, path: Path) -> None:
+        """Save the scene as a bundle; a refusal or an error of the disk is raised."""
+        ...
+
 
 class NoViews:
     """Controls of a workstation without views: everything is taken and nothing shown."""
@@ -62,3 +67,6 @@ class NoViews:
         self, moving: Sequence[Sequence[float]], fixed: Sequence[Sequence[float]]
     ) -> None:
         """Take the points (LPS, mm, n rows of 3 each)."""
+
+    def save_scene(self, path: Path) -> None:
+        """Take the path."""

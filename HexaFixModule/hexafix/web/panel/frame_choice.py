@@ -49,7 +49,7 @@ class FrameChoice:
     def build(self) -> None:
         """Make the list."""
         name = self._name
-        choice(self._context, "fixator", "Frame", name.chosen, (name.frames,), self._choose)
+        choice(self._context, "fixator", "Frame", f"{name.chosen}", (name.frames,), self._choose)
 
     def build_file(self) -> None:
         """Make the button that reads a definition from a file."""

@@ -20,6 +20,7 @@ from hexafix.web.panel.playback import Playback
 from hexafix.web.panel.poses import PosesStep
 from hexafix.web.panel.prescription import PrescriptionPages, data_address
 from hexafix.web.panel.readings import ReadingsStep
+from hexafix.web.panel.scene import SceneFile
 from hexafix.web.panel.schedule import ScheduleStep
 from hexafix.web.panel.stepper import Stepper
 from hexafix.web.panel.toolbar import Toolbar
@@ -54,7 +55,8 @@ class Panel:
         data, name = typed_state(server, PanelState)
         self._context = context = PanelContext(server, presenter, controls, data=data, name=name)
         self._chooser = Chooser(context)
-        self._bar = Toolbar(context, self._chooser)
+        self._scene = SceneFile(context, self._chooser)
+        self._bar = Toolbar(context, self._chooser, self._scene)
         self._banners = Banners(context)
         self._load = LoadStep(context, self._chooser)
         self._markers = MarkersStep(context)
@@ -87,6 +89,7 @@ class Panel:
 
     def drawer(self) -> None:
         """Make banners and steps."""
+        self._scene.build_line()
         self._banners.build()
         self._stepper.build()
 
@@ -99,6 +102,7 @@ class Panel:
         self._chooser.build()
         self._pages.build_dialog()
         self._bar.build_dialog()
+        self._scene.build_dialog()
 
     def ball_clicked(self, index: int) -> None:
         """Take a click on a ball in a view: it gets the picked number, else it is picked."""
@@ -152,6 +156,7 @@ class Panel:
     def close(self) -> None:
         """Stop what runs by itself."""
         self._playback.close()
+        self._scene.close()
 
     def _center(self) -> Any:
         """LPS, mm: the point between the fragments, once the rings are known."""

@@ -10,6 +10,7 @@ from typing import Any
 from hexafix.web.files import CASE_SUFFIXES
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext, typed_state
+from hexafix.web.panel.scene import SceneFile
 from hexafix.web.panel.widgets import button, icon_button, marked
 
 NOTICE = "Research software. Not a medical device. Plans are not approved."
@@ -26,8 +27,8 @@ class ToolbarState:
 class Toolbar:
     """Case file, undo and redo, progress."""
 
-    def __init__(self, context: PanelContext, chooser: Chooser) -> None:
-        self._context, self._chooser = context, chooser
+    def __init__(self, context: PanelContext, chooser: Chooser, scene: SceneFile) -> None:
+        self._context, self._chooser, self._scene = context, chooser, scene
         self._then: Callable[[], Any] = lambda: None
         self._data, self._name = typed_state(context.server, ToolbarState)
         context.server.trigger("hx_undo")(self.undo)
@@ -52,6 +53,7 @@ class Toolbar:
             icon_button(
                 "mdi-content-save-edit-outline", "Save the case as", "save-as", self.save_as
             )
+            self._scene.build()
         v.VDivider(vertical=True, inset=True, classes="mx-1")
         for word, icon in (("undo", "mdi-undo"), ("redo", "mdi-redo")):
             can, label = getattr(name, f"can_{word}"), getattr(name, f"{word}_label")

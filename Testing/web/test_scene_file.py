@@ -1,0 +1,91 @@
+"""Saving the scene: where it goes, what is asked before, what is told after."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+from hexafix.errors import InputError, Refused
+from hexafix.web.panel.context import PanelContext, typed_state
+from hexafix.web.panel.controls import NoViews
+from hexafix.web.panel.scene import SceneFile, scene_path
+from hexafix.web.state import PanelState
+
+
+class Views(NoViews):
+    """Views that write what they are told to, or raise."""
+
+    fault: Exception | None = None
+
+    def save_scene(self, path):
+        if self.fault is not None:
+            raise self.fault
+        path.write_bytes(b"scene")
+
+
+@pytest.fixture
+def views():
+    return Views()
+
+
+@pytest.fixture
+def scene(views, request):
+    from trame.app import get_server
+
+    server = get_server(f"scene-{request.node.name}", client_type="vue3")
+    data, name = typed_state(server, PanelState)
+    presenter = SimpleNamespace(snapshot=SimpleNamespace(banners=(), busy=False))
+    return SceneFile(PanelContext(server, presenter, views, data=data, name=name), None)
+
+
+def take(scene, path, *, answer=None):
+    """Let the chooser hand over a path, and wait until all is told."""
+
+    async def told():
+        scene.take(path)
+        asked = scene._data.asking
+        if asked and answer is not None:
+            answer()
+        if scene.task is not None:
+            await scene.task
+        return asked
+
+    return asyncio.run(told())
+
+
+def test_a_scene_goes_into_a_folder_or_gets_its_ending(tmp_path):
+    assert scene_path(tmp_path) == tmp_path / "scene.mrb"
+    assert scene_path(tmp_path / "tibia") == tmp_path / "tibia.mrb"
+    assert scene_path(tmp_path / "tibia.json") == tmp_path / "tibia.json.mrb"
+    assert scene_path(tmp_path / "Tibia.MRB") == tmp_path / "Tibia.MRB"
+
+
+def test_a_saved_scene_is_told_with_its_place(scene, tmp_path):
+    assert not take(scene, tmp_path / "tibia")
+    assert (tmp_path / "tibia.mrb").read_bytes() == b"scene"
+    assert scene._data.saved == str(tmp_path / "tibia.mrb")
+    assert not scene._data.saving
+
+
+def test_a_file_is_replaced_only_when_the_user_says_so(scene, tmp_path):
+    path = tmp_path / "tibia.mrb"
+    path.write_bytes(b"older")
+    assert take(scene, path, answer=scene._keep)
+    assert (path.read_bytes(), scene._data.saved) == (b"older", "")
+    assert take(scene, path, answer=scene._replace)
+    assert (path.read_bytes(), scene._data.asking) == (b"scene", False)
+
+
+@pytest.mark.parametrize("kind", [InputError, Refused])
+def test_what_hinders_saving_is_told_like_every_other_error(scene, views, tmp_path, kind):
+    views.fault = kind.of("x-code", "it is so", hazard="H46", next_step="do this")
+    take(scene, tmp_path / "tibia.mrb")
+    notice = scene._context.data.notice
+    assert (notice["code"], notice["hazard"], notice["next_step"]) == ("x-code", "H46", "do this")
+    assert (scene._data.saved, scene._data.saving) == ("", False)
+
+
+def test_no_scene_is_saved_while_a_field_shows_what_the_case_does_not_hold(scene, tmp_path):
+    scene._context.data.field_errors = {"reading-2": "not taken"}
+    take(scene, tmp_path / "tibia.mrb")
+    assert scene._context.data.notice["code"] == "field-not-taken"
+    assert not (tmp_path / "tibia.mrb").exists()
