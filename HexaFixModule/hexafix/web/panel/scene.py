@@ -64,10 +64,13 @@ class SceneFile:
         from trame.widgets import vuetify3 as v
 
         name = self._name
-        with html.Div(
-            v_if=f"{name.saving} || {name.saved}",
-            classes="hxp-banner hxp-banner-info",
-            **marked("scene-line", role="status", data_saving=(name.saving,)),
+        shown = f"{name.saving} || {name.saved}"
+        with (
+            html.Div(v_if=shown, classes="hxp-banners"),
+            html.Div(
+                classes="hxp-banner hxp-banner-info",
+                **marked("scene-line", role="status", data_saving=(name.saving,)),
+            ),
         ):
             v.VIcon(icon="mdi-information", size="small", color="info")
             with html.Div(classes="hxp-banner-text"):
