@@ -19,8 +19,8 @@ FLAGS = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
 )
 
-WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 1000, "height": 700}
-HIGH = {"width": 1000, "height": 860}
+WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 1060, "height": 720}
+HIGH = {"width": 1060, "height": 900}
 """Sizes of the browser's window, CSS pixels."""
 
 SCALE = 1.2
