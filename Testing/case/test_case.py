@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from hexafix.case import case_from_document, load_case, load_layouts
+from hexafix.case import case_from_document, load_case, load_layouts, load_rings
 from hexafix.errors import InputError
 
 
@@ -170,6 +170,21 @@ def test_layouts_are_read_from_a_case_and_from_a_layout_file(a_case_document, tm
     one, two = (load_layouts(tmp_path / name) for name in ("layout.json", "case.json"))
     for a, b in zip(one, two, strict=True):
         assert np.array_equal(a.points_mm, b.points_mm)
+
+
+@pytest.mark.parametrize("version", [0, 2, True, 1.0, "1", None])
+def test_a_layout_or_ring_file_of_any_other_version_is_refused(version, a_case_document, tmp_path):
+    markers = a_case_document["markers"]
+    rings = {ring: markers[ring] for ring in ("proximal", "distal")}
+    holes = {"holes": {"count": 36, "radius_mm": 100.0}}
+    for read_file, content in ((load_layouts, rings), (load_rings, rings), (load_rings, holes)):
+        path = tmp_path / "file.json"
+        path.write_text(json.dumps({"schema_version": 1, **content}))
+        read_file(path)
+        path.write_text(json.dumps({"schema_version": version, **content}))
+        with pytest.raises(InputError) as error:
+            read_file(path)
+        assert [fault.where for fault in error.value.faults] == ["schema_version"]
 
 
 def test_the_fixator_may_be_written_out_or_lie_beside_the_case(a_case_document, a_case_folder):

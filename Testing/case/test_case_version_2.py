@@ -79,7 +79,7 @@ def test_a_wrong_edit_is_refused_at_its_path(a_case_document, a_case_folder, val
     assert set(faults(document, a_case_folder)) == {where}
 
 
-@pytest.mark.parametrize("version", [0, 3, True, "2", 2.5, None])
+@pytest.mark.parametrize("version", [0, 3, True, 1.0, 2.0, "2", 2.5, None])
 def test_any_other_version_is_refused(a_case_document, a_case_folder, version):
     found = faults({**a_case_document, "schema_version": version}, a_case_folder)
     assert "schema_version" in found

@@ -65,6 +65,7 @@ def test_all_faults_are_named_at_once(a_document) -> None:
     ("path", "value", "where", "code"),
     [
         (("schema_version",), True, "fixator.schema_version", "schema-version"),
+        (("schema_version",), 1.0, "fixator.schema_version", "schema-version"),
         (("schema_version",), "1", "fixator.schema_version", "schema-version"),
         (("name",), " ", "fixator.name", "wrong-type"),
         (("source",), 3, "fixator.source", "wrong-type"),

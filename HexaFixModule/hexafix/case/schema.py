@@ -24,6 +24,10 @@ Point = Annotated[list[Mm], Field(min_length=3, max_length=3)]
 Row = Annotated[list[float], Field(min_length=4, max_length=4)]
 Side = Literal["proximal", "distal"]
 
+# not a Literal: to that, true and 1.0 are 1
+Version1 = Annotated[int, Field(ge=1, le=1)]
+Version1Or2 = Annotated[int, Field(ge=1, le=2)]
+
 
 class _Strict(BaseModel):
     model_config = ConfigDict(
@@ -72,7 +76,7 @@ class Holes(_Strict):
 class LayoutFile(_Strict):
     """A layout alone, for ``check-layout`` and ``advise`` before any CT."""
 
-    schema_version: Literal[1]
+    schema_version: Version1
     proximal: Annotated[list[Marker], Field(min_length=3, max_length=24)]
     distal: Annotated[list[Marker], Field(min_length=3, max_length=24)]
     ball_diameter_mm: Annotated[float, Field(ge=2.0, le=40.0)] | None = None
@@ -82,7 +86,7 @@ class LayoutFile(_Strict):
 class RingFile(_Strict):
     """A single ring for ``advise``: its places and, where there is one, its layout."""
 
-    schema_version: Literal[1]
+    schema_version: Version1
     holes: dict[str, Any]
     markers: Annotated[list[Marker], Field(min_length=3, max_length=24)] | None = None
     ball_diameter_mm: Annotated[float, Field(ge=2.0, le=40.0)] | None = None
@@ -156,8 +160,7 @@ class Schedule(_Strict):
 class CaseFile(_Strict):
     """The whole case file (``case.json``) of version 1; `EditedCaseFile` adds what 2 knows."""
 
-    # not a Literal: to that, true is 1
-    schema_version: Annotated[int, Field(ge=1, le=2)]
+    schema_version: Version1Or2
     case_id: Annotated[str, Field(pattern=CASE_ID_PATTERN)]
     limb: Limb
     image: Image

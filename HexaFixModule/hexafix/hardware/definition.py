@@ -105,14 +105,13 @@ def fixator_from_document(document: Any, *, where: str = "fixator") -> Fixator:
     """
     check = _Check()
     top = check.keys(document, _TOP, where)
-    if "schema_version" in top and (
-        isinstance(top["schema_version"], bool) or top["schema_version"] != SCHEMA_VERSION
-    ):
+    version = top.get("schema_version", SCHEMA_VERSION)
+    if type(version) is not int or version != SCHEMA_VERSION:  # true and 1.0 equal 1
         check.fault(
             "schema-version",
             "unknown schema version",
             f"{where}.schema_version",
-            repr(top["schema_version"]),
+            repr(version),
             str(SCHEMA_VERSION),
         )
     texts = {key: check.text(top, key, where) for key in ("id", "name", "source")}
