@@ -24,7 +24,8 @@ def faults(document, folder):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("marker_edits", EDITS), ("ring_front_confirmed", True)]
+    ("key", "value"),
+    [("marker_edits", EDITS), ("ring_front_confirmed", True), ("readings_to_repeat", False)],
 )
 def test_version_1_refuses_each_new_key_by_name(a_case_document, a_case_folder, key, value):
     found = faults({**a_case_document, key: value}, a_case_folder)

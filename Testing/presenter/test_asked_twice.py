@@ -1,6 +1,8 @@
 """Asked a second time before an export: side (H37), readings (H24), rings' front (H22)."""
 
 import pytest
+from hexafix.case import load_case
+from hexafix.errors import InputError
 from hexafix.presenter import Step
 
 AGAIN = [180.0, 174.5, 167.0, 168.0, 157.0, 181.5]
@@ -113,6 +115,50 @@ def test_readings_saved_before_they_were_repeated_stay_asked_for(a_planned, tmp_
     a_planned.run_all()
     assert a_planned.snapshot.confirmed["readings_needed"]
     assert not a_planned.snapshot.can_export
+
+
+def test_readings_typed_once_and_saved_are_asked_for_when_the_case_is_opened_again(
+    a_planned, make_presenter, an_engine, tmp_path
+):
+    a_planned.set_reading(2, 174.5)
+    assert a_planned.save_case()
+    assert not a_planned.snapshot.edited
+    again = make_presenter(engine=an_engine, threaded=False)
+    assert again.open_case(a_planned.case_path)
+    assert not again.snapshot.edited
+    again.run_all()
+    again.confirm_side("left")
+    assert again.snapshot.confirmed["readings_needed"]
+    assert "second time" in again.snapshot.export_blocked_by
+    assert not again.export(tmp_path / "out")
+    again.repeat_readings(AGAIN)
+    assert again.export(tmp_path / "out")
+
+
+def test_no_door_plans_a_file_whose_readings_were_typed_once(a_planned):
+    a_planned.set_reading(2, 174.5)
+    a_planned.save_case()
+    with pytest.raises(InputError) as error:
+        load_case(a_planned.case_path)
+    (fault,) = error.value.faults
+    assert (fault.code, fault.hazard) == ("readings-to-repeat", "H24")
+    assert load_case(a_planned.case_path, plannable=False).strut_readings_mm[1] == 174.5
+    a_planned.repeat_readings(AGAIN)
+    assert a_planned.snapshot.edited
+    a_planned.save_case()
+    assert a_planned.case_path.read_bytes() == a_planned.version.raw
+    load_case(a_planned.case_path)
+
+
+def test_a_file_whose_readings_were_repeated_is_opened_as_settled(
+    a_planned, make_presenter, an_engine
+):
+    a_planned.set_reading(2, 174.5)
+    a_planned.repeat_readings(AGAIN)
+    a_planned.save_case()
+    again = make_presenter(engine=an_engine, threaded=False)
+    again.open_case(a_planned.case_path)
+    assert not again.snapshot.confirmed["readings_needed"]
 
 
 def test_readings_of_a_new_case_are_asked_twice(make_presenter, an_engine):

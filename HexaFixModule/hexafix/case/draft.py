@@ -37,6 +37,7 @@ OPTIONAL_KEYS = (
     "schedule",
     "marker_edits",
     "ring_front_confirmed",
+    "readings_to_repeat",
 )
 """Keys without which a case can be recognised."""
 

@@ -144,6 +144,17 @@ def _parse(raw: bytes, *, folder: Path, needs_image: bool, plannable: bool) -> _
             for key in ("strut_readings_mm", "correction", "schedule")
             if content.get(key) is None and key not in broken
         ]
+        if content.get("readings_to_repeat") is True:
+            faults.append(
+                Fault(
+                    "readings-to-repeat",
+                    "the strut readings were typed at a workstation, and only once",
+                    where="readings_to_repeat",
+                    hazard="H24",
+                    next_step="open the case at a workstation, enter the six readings a second "
+                    "time and save it",
+                )
+            )
     return _Parsed(content, faults, fixator, definition, image)
 
 

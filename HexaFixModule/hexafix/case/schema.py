@@ -184,9 +184,10 @@ class EditedCaseFile(CaseFile):
 
     marker_edits: MarkerEditsPart | None = None
     ring_front_confirmed: bool | None = None
+    readings_to_repeat: bool | None = None
 
 
-VERSION_2_KEYS = ("marker_edits", "ring_front_confirmed")
+VERSION_2_KEYS = ("marker_edits", "ring_front_confirmed", "readings_to_repeat")
 """Keys that version 1 does not know."""
 
 

@@ -11,9 +11,15 @@ from hexafix.export import replace_file
 from hexafix.presenter.history import Version, document_bytes
 from hexafix.strict_json import read_json_object
 
+TYPED_ONCE = "readings_to_repeat"
+"""Key of a file whose readings were typed once (H24); the case at work never holds it, so that
+repeating them changes no plan."""
 
-def read_case_file(path: Path) -> tuple[Path, Version]:
-    """The case file's path and its content, complete or a draft.
+
+def read_case_file(path: Path) -> tuple[Path, bytes, Version]:
+    """The case file's path, its bytes, and its content, complete or a draft.
+
+    The content has other bytes than the file where that says that its readings were typed once.
 
     Raises
     ------
@@ -29,7 +35,17 @@ def read_case_file(path: Path) -> tuple[Path, Version]:
             where="case file",
             next_step="open a case.json, or load an image into a new case",
         )
-    return file, Version(raw, file.parent, label="open the case")
+    content_bytes = raw
+    if content.get(TYPED_ONCE) is True:
+        content_bytes = document_bytes({k: v for k, v in content.items() if k != TYPED_ONCE})
+    return file, raw, Version(content_bytes, file.parent, label="open the case")
+
+
+def file_bytes(version: Version, *, typed_once: bool) -> bytes:
+    """A version as it is saved; `typed_once`: its readings were typed and not repeated."""
+    if not typed_once:
+        return version.raw
+    return document_bytes({**version.copy(), "schema_version": 2, TYPED_ONCE: True})
 
 
 def moved(version: Version, folder: Path) -> Version:

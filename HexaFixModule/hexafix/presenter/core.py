@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from hexafix.errors import Fault
-from hexafix.presenter import notices, view
+from hexafix.presenter import casefile, notices, view
 from hexafix.presenter.compute import compute, faults_of_error, kind_of
 from hexafix.presenter.engine import Engine, pipeline_engine
 from hexafix.presenter.history import History, Version, document_bytes
@@ -78,6 +78,7 @@ class Core:
         self.side_answer: tuple[str, str] | None = None
         """The side given the second time, and the image it was given for."""
         self.readings_opened: list[Any] | None = None
+        """The readings of the file that was opened, unless they were typed once."""
         self.readings_repeated: list[Any] | None = None
         self.series: Mapping[str, Any] | None = None
         self.layout: tuple[str, Mapping[str, Any] | None] = ("", None)
@@ -177,7 +178,13 @@ class Core:
         """Whether something is not saved."""
         if self.saved is None:
             return self.history.can_undo
-        return self.version.raw != self.saved
+        return casefile.file_bytes(self.version, typed_once=self.typed_once) != self.saved
+
+    @property
+    def typed_once(self) -> bool:
+        """Whether the readings were typed here and not yet repeated (H24)."""
+        given = self.version.content.get("strut_readings_mm")
+        return given is not None and given not in (self.readings_opened, self.readings_repeated)
 
     @property
     def side(self) -> str | None:

@@ -33,24 +33,26 @@ class Presenter(BallEdits, Work):
     @action
     def open_case(self, path: str | Path) -> None:
         """Open a case file, complete or a draft, or the ``case.json`` of a folder."""
-        file, version = casefile.read_case_file(Path(path))
-        self._take(version, file)
+        file, raw, version = casefile.read_case_file(Path(path))
+        self._take(version, file, raw)
 
     @action
     def new_case(self) -> None:
         """Begin a case."""
-        self._take(Version(document_bytes(NEW_CASE)), None)
+        self._take(Version(document_bytes(NEW_CASE)))
 
-    def _take(self, version: Version, file: Path | None) -> None:
+    def _take(self, version: Version, file: Path | None = None, saved: bytes | None = None) -> None:
+        """Begin work on a version, of a file that holds the bytes `saved` or of none."""
         if self.job is not None:
             self.job.cancel()
         self.history = History(version)
-        self.case_path, self.saved = file, version.raw if file else None
+        self.case_path, self.saved = file, saved
         self.results.clear_shown()
         self.current = Step.LOAD
         self.side_answer, self.readings_repeated = None, None
         given = version.content.get("strut_readings_mm")
-        self.readings_opened = list(given) if file and isinstance(given, list) else None
+        settled = saved == version.raw and isinstance(given, list)
+        self.readings_opened = list(given) if settled else None
         self.series, self.exported = None, None
         self.look_again()
 
@@ -74,9 +76,10 @@ class Presenter(BallEdits, Work):
         target = target / "case.json" if target.is_dir() else target
         version = casefile.moved(self.version, target.parent)
         own = target == self.case_path
-        casefile.write_case_file(target, version.raw, expected=self.saved if own else None)
+        raw = casefile.file_bytes(version, typed_once=self.typed_once)
+        casefile.write_case_file(target, raw, expected=self.saved if own else None)
         self.history.replace(version)
-        self.case_path, self.saved = target, version.raw
+        self.case_path, self.saved = target, raw
         self.new_version()
 
     @action
