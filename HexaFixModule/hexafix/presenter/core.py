@@ -77,7 +77,7 @@ class Core:
         self.current = Step.LOAD
         self.side_answer: tuple[str, str] | None = None
         """The side given the second time, and the image it was given for."""
-        self.readings_opened: list[Any] | None = None
+        self.readings_opened: Any = None
         """The readings of the file that was opened, unless they were typed once."""
         self.readings_repeated: list[Any] | None = None
         self.series: Mapping[str, Any] | None = None

@@ -51,8 +51,7 @@ class Presenter(BallEdits, Work):
         self.current = Step.LOAD
         self.side_answer, self.readings_repeated = None, None
         given = version.content.get("strut_readings_mm")
-        settled = saved == version.raw and isinstance(given, list)
-        self.readings_opened = list(given) if settled else None
+        self.readings_opened = given if saved == version.raw else None
         self.series, self.exported = None, None
         self.look_again()
 
