@@ -325,3 +325,17 @@ def test_the_list_of_steps_opens_their_pages(panel, widgets, presenter, place):
     chosen(place)
     assert widgets.get("stepStack", "index") == place
     assert presenter.snapshot.current == list(Step)[place]
+
+
+def test_a_mistake_is_told_without_keys_of_the_case_file(panel, widgets):
+    from hexafix.errors import InputError
+    from hexafix.panel.panel import BINDINGS
+
+    error = InputError.of(
+        "x", "it is wrong", value="1", limit="2", where="schedule.strut_step_mm", next_step="mend"
+    )
+    binding = next(b for b in BINDINGS if b.widget == "strutStepLineEdit")
+    panel._wrong(binding, error)
+    words = "it is wrong (value 1, limit 2), at: smallest strut step"
+    assert panel.notices[0].message == words
+    assert widgets.values["strutStepLineEdit", "mark"] == f"{words}. Next step: mend"

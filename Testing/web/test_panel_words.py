@@ -309,3 +309,19 @@ def test_a_defect_is_not_swallowed(a_context):
 def test_a_label_is_an_attribute_and_an_expression_is_bound():
     raw = marked(("'row-' + i",), label="Remove the ball")["raw_attrs"]
     assert raw == [""":data-testid="'row-' + i\"""", 'aria-label="Remove the ball"']
+
+
+def test_fields_not_taken_are_told_by_what_stands_beside_them():
+    from hexafix.web.panel.context import field_words
+
+    told = {
+        "reading-2": "strut 2",
+        "again-6": "strut 6 again",
+        "schedule-max_rate_mm_per_day": "fastest motion",
+        "distal-0-sweep_deg": "layout of the distal ring, row 1, sweep",
+        "ball-diameter": "diameter of the marker balls",
+        "limb-side": "side of the limb",
+        "case-id": "name of the case",
+        "fixator": "fixator",
+    }
+    assert {name: field_words(name) for name in told} == told

@@ -12,6 +12,7 @@ from hexafix.panel.binding import Binding
 from hexafix.panel.picking import clicked
 from hexafix.panel.widgets import Widgets
 from hexafix.presenter import Banner, Presenter, Snapshot, Step, Table
+from hexafix.presenter.notices import line_of, message_of, next_step_of
 from hexafix.presenter.signal import Signal
 
 BINDINGS: tuple[Binding, ...] = (
@@ -230,7 +231,7 @@ class Panel:
         self.notices = tuple(_banner(fault, self.snapshot.current) for fault in error.faults)
         if binding.event in ("edited", "cell"):
             self.mistakes[binding.widget] = error.faults[0]
-            self.widgets.set(binding.widget, "mark", error.faults[0].message)
+            self.widgets.set(binding.widget, "mark", line_of(error.faults[0]))
 
     def commit(self) -> bool:
         """Take over everything typed; False, with a message, if something cannot be."""
@@ -358,8 +359,8 @@ def _banner(fault: Fault, step: Step | None) -> Banner:
         kind="error",
         code=fault.code,
         title="Not possible",
-        message=Fault(fault.code, fault.what, fault.value, fault.limit, where=fault.where).message,
-        next_step=fault.next_step or "",
+        message=message_of(fault),
+        next_step=next_step_of(fault),
         hazard=fault.hazard or "",
         step=step,
     )

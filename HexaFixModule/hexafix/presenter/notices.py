@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from types import MappingProxyType
 
 from hexafix.errors import Fault
+from hexafix.presenter.places import place_words, plain_text
 from hexafix.presenter.state import TITLES, Banner, Kind, Step
 
 _GRAVEST: tuple[Kind, ...] = ("refused", "error", "warning", "info")
@@ -28,6 +29,14 @@ NEXT_STEPS = MappingProxyType(
     }
 )
 """Next steps in the workstation's words, where the command line's would name its options."""
+
+_WHOLE_STEP = {
+    Step.NUMBERING: "numbering",
+    Step.READINGS: "strut_readings_mm",
+    Step.CORRECTION: "correction",
+    Step.SCHEDULE: "schedule",
+}
+"""Places that tell no more than the name of their step."""
 
 SIDE_ASKED = Fault(
     "side-to-confirm",
@@ -54,14 +63,8 @@ FRONT_ASKED = Fault(
 
 def banner(fault: Fault, *, kind: Kind, step: Step | None = None) -> Banner:
     """A fault as a banner; its id follows from its content."""
-    text = f"{fault.what}"
-    if fault.value is not None:
-        text += f" (value {fault.value}" + (f", limit {fault.limit})" if fault.limit else ")")
-    elif fault.limit is not None:
-        text += f" (limit {fault.limit})"
-    if fault.where:
-        text += f" [{fault.where}]"
-    name = f"{kind} {step} {fault.code} {text}"
+    text = message_of(fault, step=step)
+    name = f"{kind} {step} {fault.code} {fault.where} {text}"
     words = _WORDS[kind]
     return Banner(
         id=hashlib.sha256(name.encode()).hexdigest()[:12],
@@ -69,10 +72,43 @@ def banner(fault: Fault, *, kind: Kind, step: Step | None = None) -> Banner:
         code=fault.code,
         title=words.capitalize() if step is None else f"{TITLES[step]}: {words}",
         message=text,
-        next_step=NEXT_STEPS.get(fault.code) or fault.next_step or "",
+        next_step=next_step_of(fault),
         hazard=fault.hazard or "",
         step=step,
     )
+
+
+def message_of(fault: Fault, *, step: Step | None = None) -> str:
+    """What is wrong, the value, the limit and the place, as every door shows it.
+
+    Parameters
+    ----------
+    fault : Fault
+    step : Step or None
+        The step that is named beside the message: its own name is not said again.
+    """
+    given = (("value", fault.value), ("limit", fault.limit))
+    numbers = ", ".join(f"{word} {plain_text(text)}" for word, text in given if text)
+    text = plain_text(fault.what) + (f" ({numbers})" if numbers else "")
+    place = _place(fault.where, step)
+    return text if place in text else f"{text}, at: {place}"
+
+
+def next_step_of(fault: Fault) -> str:
+    """What the user can do, in the workstation's words."""
+    return plain_text(NEXT_STEPS.get(fault.code) or fault.next_step or "")
+
+
+def line_of(fault: Fault) -> str:
+    """A whole fault in one line."""
+    step = next_step_of(fault)
+    return message_of(fault) + (f". Next step: {step}" if step else "")
+
+
+def _place(where: str | None, step: Step | None) -> str:
+    words = place_words(where)
+    whole = "" if step is None else place_words(_WHOLE_STEP.get(step))
+    return words.removeprefix(whole).removeprefix(", ") if whole else words
 
 
 def sorted_banners(banners: Iterable[Banner]) -> tuple[Banner, ...]:

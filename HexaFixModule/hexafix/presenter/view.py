@@ -11,6 +11,7 @@ from hexafix.errors import Fault
 from hexafix.presenter import notices, tables
 from hexafix.presenter.compute import defect
 from hexafix.presenter.inputs import ORDER, is_missing
+from hexafix.presenter.places import plain_text
 from hexafix.presenter.results import Result
 from hexafix.presenter.state import TITLES, Banner, Snapshot, Step, StepState, StepView, Table
 
@@ -100,7 +101,7 @@ def _first_words(faults: list[Fault]) -> str:
     if not faults:
         return ""
     first = faults[0]
-    return first.next_step if is_missing(first) and first.next_step else first.what
+    return plain_text(first.next_step if is_missing(first) and first.next_step else first.what)
 
 
 def _state(core: Core, step: Step, found: Result | None, missing: tuple[Fault, ...]) -> StepState:

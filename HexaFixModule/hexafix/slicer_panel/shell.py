@@ -179,4 +179,7 @@ class SlicerPanel:
         try:
             work()
         except HexaFixError as error:
-            host.slicer().util.errorDisplay(str(error), windowTitle="HexaFix")
+            from hexafix.presenter.notices import line_of
+
+            words = "; ".join(line_of(fault) for fault in error.faults)
+            host.slicer().util.errorDisplay(words, windowTitle="HexaFix")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from hexafix.panel.text import text_of
+from hexafix.presenter.notices import message_of, next_step_of
 
 if TYPE_CHECKING:
     from hexafix.presenter import Snapshot, Table
@@ -161,7 +162,7 @@ def _step_words(view: Any) -> dict[str, Any]:
         "color": color,
         "icon": icon,
         "summary": view.summary,
-        "faults": [fault.next_step or fault.message for fault in view.faults],
+        "faults": [next_step_of(fault) or message_of(fault) for fault in view.faults],
     }
 
 

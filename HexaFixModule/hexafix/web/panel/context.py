@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from hexafix.errors import HexaFixError, InputError
 from hexafix.panel.text import NUMBER
+from hexafix.presenter.notices import message_of, next_step_of
+from hexafix.presenter.places import place_words
 from hexafix.web.panel.controls import ViewControls
 from hexafix.web.state import NAMESPACE
 
@@ -95,8 +97,8 @@ class PanelContext:
             self.data.field_errors = {**self.data.field_errors, field: words}
             return
         self.data.notice = {
-            "message": "; ".join(f.message.partition(". Next step: ")[0] for f in error.faults[:3]),
-            "next_step": fault.next_step or "",
+            "message": "; ".join(message_of(fault) for fault in error.faults[:3]),
+            "next_step": next_step_of(fault),
             "hazard": fault.hazard or "",
             "code": fault.code,
         }
@@ -127,10 +129,31 @@ class PanelContext:
         if self.data.field_errors:
             raise InputError.of(
                 "field-not-taken",
-                "the text of a field was not taken: " + ", ".join(self.data.field_errors),
+                "the text of a field was not taken: "
+                + ", ".join(field_words(name) for name in self.data.field_errors),
                 next_step="correct the marked field, or undo to see the case's values again",
                 hazard="H26",
             )
+
+
+FIELDS = {
+    "case-id": "case_id",
+    "limb-side": "limb.side",
+    "limb-bone": "limb.bone",
+    "ball-diameter": "markers.ball_diameter_mm",
+}
+"""Names of single fields and their places in the case."""
+
+
+def field_words(name: str) -> str:
+    """What the screen calls a field: ``schedule-start_date`` is the schedule's first day."""
+    top, _, rest = name.partition("-")
+    row, _, key = rest.partition("-")
+    if top in ("reading", "again"):
+        return f"strut {rest}" + (" again" if top == "again" else "")
+    if top in ("proximal", "distal"):
+        return place_words(f"markers.{top}[{row}].{key}")
+    return place_words(f"schedule.{rest}" if top == "schedule" else FIELDS.get(name, name))
 
 
 def typed_state(server: Any, kind: type[State]) -> tuple[State, State]:
