@@ -1,8 +1,10 @@
 """Which side of the patient stands at which edge, and which point is under a pixel."""
 
+import re
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 SIZE, FIELD_MM = (200, 100), (100.0, 50.0)
@@ -58,15 +60,63 @@ def test_an_oblique_slice_names_the_second_axis_too():
         assert edge_letters(node)["left"] == expected
 
 
-def test_a_slice_says_where_it_stands():
+def test_a_slice_says_the_coordinate_that_a_ball_in_it_has():
     from hexafix.mrml.screen import slice_position
 
-    axial = slice_node((-1, 0, 0), (0, 1, 0), (5.0, 6.0, -123.45))
-    assert slice_position(axial) == "123.5 mm F"
+    # RAS (5, 61, 7) is LPS (-5, -61, 7)
+    axial = slice_node((-1, 0, 0), (0, 1, 0), (5.0, 6.0, -123.46))
+    assert slice_position(axial) == "S -123.5 mm"
     coronal = slice_node((-1, 0, 0), (0, 0, 1), (5.0, 61.0, 7.0))
-    assert slice_position(coronal) == "61.0 mm A"
+    assert slice_position(coronal) == "P -61.0 mm"
     sagittal = slice_node((0, -1, 0), (0, 0, 1), (5.0, 61.0, 7.0))
-    assert slice_position(sagittal) == "5.0 mm R"
+    assert slice_position(sagittal) == "L -5.0 mm"
+    assert slice_position(slice_node((0, 1, 0), (0, 0, 1), (-5.0, 61.0, 7.0))) == "L 5.0 mm"
+    assert slice_position(slice_node((-1, 0, 0), (0, 1, 0), (5.0, 6.0, 0.04))) == "S 0.0 mm"
+    assert slice_position(slice_node((-1, 0, 0), (0, 1, 0), (5.0, 6.0, -0.04))) == "S 0.0 mm"
+
+
+TOLD = re.compile(r"([LPS]) (-?[0-9]+\.[0-9]) mm in the middle, tilted ([0-9]+\.[0-9])°")
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    origin=st.tuples(*[st.floats(-400.0, 400.0)] * 3),
+    pan=st.tuples(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0)),
+)
+def test_a_tilted_slice_says_the_coordinate_of_its_middle_and_its_tilt(angles, origin, pan):
+    from hexafix.mrml.screen import slice_position
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_euler("xyz", angles)
+    right, up, normal = (turn.apply(axis) for axis in np.eye(3))
+    node = slice_node(right, up, origin)
+    node.SetXYZOrigin(*pan, 0.0)
+    node.UpdateMatrices()
+    # the middle of the view by hand, in LPS, and the angle to the axis by the sine
+    middle = (np.array(origin) + pan[0] * right + pan[1] * up) * (-1, -1, 1)
+    axis = max(range(3), key=lambda k: abs(normal[k]))
+    assume(sorted(abs(normal))[2] - sorted(abs(normal))[1] > 1e-6)
+    tilt = np.degrees(np.arctan2(np.linalg.norm(np.delete(normal, axis)), abs(normal[axis])))
+    assume(tilt > 0.5)
+    letter, value, told = TOLD.fullmatch(slice_position(node)).groups()
+    assert letter == "LPS"[axis]
+    assert float(value) == pytest.approx(middle[axis], abs=0.051)
+    assert float(told) == pytest.approx(tilt, abs=0.051)
+
+
+def test_a_slice_is_called_tilted_only_where_its_coordinate_shows_it():
+    from hexafix.mrml.screen import slice_position
+    from scipy.spatial.transform import Rotation
+
+    def at(degrees):
+        turn = Rotation.from_euler("x", degrees, degrees=True)
+        axes = turn.apply(np.eye(3))
+        return slice_position(slice_node(axes[0], axes[1], (0.0, 0.0, 20.0)))
+
+    # 25 mm from the middle to an edge: 0.05 mm at 0.1146 degrees
+    assert at(0.11) == "S 20.0 mm"
+    assert at(0.12) == "S 20.0 mm in the middle, tilted 0.1°"
 
 
 def test_a_pixel_of_an_axial_slice_is_the_patient_point_under_it():

@@ -12,6 +12,12 @@ from hexafix.mrml.geometry import array4, lps_points, ras_points
 EDGE_LETTERS = (("R", "L"), ("A", "P"), ("H", "F"))
 """Names of the positive and negative direction along each RAS axis; H and F: head and foot."""
 
+LPS_LETTERS = "LPS"
+"""Names of the axes along which every point is told."""
+
+TOLD_MM = 0.05
+"""Half of the last digit of a slice's position."""
+
 OBLIQUE = 0.3
 """Cosine from which a second axis is named too: 17.5 deg off the first."""
 
@@ -54,18 +60,29 @@ def direction_letters(direction_ras: Sequence[float] | np.ndarray) -> str:
 
 
 def slice_position(slice_node: Any) -> str:
-    """Where a slice stands: its distance from the origin of the patient's frame, with direction.
+    """Where a slice stands, as the balls are told: the LPS coordinate across it.
+
+    The coordinate along the patient's axis that is nearest to the slice's normal, at the middle of
+    the view. A tilted slice has another value at each of its points, and says so.
 
     Parameters
     ----------
     slice_node : vtkMRMLSliceNode
         The view's node.
     """
-    to_ras = array4(slice_node.GetSliceToRAS())
-    normal = to_ras[:3, 2]
-    offset = float(to_ras[:3, 3] @ normal)
-    toward = direction_letters(normal if offset >= 0 else -normal)
-    return f"{abs(offset):.1f} mm {toward}"
+    to_ras = array4(slice_node.GetXYToRAS())
+    width, height, _ = slice_node.GetDimensions()
+    middle = lps_points((to_ras @ (0.5 * width, 0.5 * height, 0.0, 1.0))[:3])
+    normal = array4(slice_node.GetSliceToRAS())[:3, 2]
+    share = np.abs(normal) / np.linalg.norm(normal)
+    axis = int(np.argmax(share))
+    # How much the coordinate changes from the middle to an edge of the view, in mm.
+    edges = (0.5 * width * to_ras[axis, 0], 0.5 * height * to_ras[axis, 1])
+    words = f"{LPS_LETTERS[axis]} {middle[axis]:.1f} mm".replace("-0.0 ", "0.0 ")
+    if sum(map(abs, edges)) < TOLD_MM:
+        return words
+    tilt_deg = np.degrees(np.arccos(min(1.0, share[axis])))
+    return f"{words} in the middle, tilted {max(tilt_deg, 0.1):.1f}°"
 
 
 def point_under(slice_node: Any, x: float, y: float) -> tuple[float, float, float]:
