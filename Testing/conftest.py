@@ -37,6 +37,16 @@ def a_phantom_case(a_phantom, tmp_path):
 
 
 @pytest.fixture(scope="session")
+def a_case_on_disk(a_phantom, tmp_path_factory):
+    """The phantom's case file beside its CT as NRRD; copy the folder before changing it."""
+    from hexafix.phantom import write_phantom
+
+    folder = tmp_path_factory.mktemp("on-disk") / "phantom"
+    write_phantom(a_phantom, folder, image_format="nrrd")
+    return folder / "case.json"
+
+
+@pytest.fixture(scope="session")
 def a_recognised(a_phantom):
     """What the chain recognises in the phantom."""
     from pathlib import Path

@@ -11,13 +11,9 @@ from hexafix.presenter import Presenter, Step
 
 
 @pytest.fixture(scope="module")
-def a_phantom_folder(a_phantom, tmp_path_factory):
+def a_phantom_folder(a_case_on_disk):
     """The session's phantom as a user has it: an NRRD and a case file."""
-    from hexafix.phantom import write_phantom
-
-    folder = tmp_path_factory.mktemp("presenter") / "phantom"
-    write_phantom(a_phantom, folder, image_format="nrrd")
-    return folder
+    return a_case_on_disk.parent
 
 
 @pytest.fixture(scope="module")

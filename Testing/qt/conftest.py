@@ -48,16 +48,6 @@ def qapp_args(a_display):
     return ["hexafix"]
 
 
-@pytest.fixture(scope="session")
-def a_case_on_disk(a_phantom, tmp_path_factory):
-    """The phantom's case file beside its CT as NRRD."""
-    from hexafix.phantom import write_phantom
-
-    folder = tmp_path_factory.mktemp("desktop") / "phantom"
-    write_phantom(a_phantom, folder, image_format="nrrd")
-    return folder / "case.json"
-
-
 @pytest.fixture
 def an_own_case(a_case_on_disk, tmp_path):
     """A case file that a test may overwrite; its CT is the shared one."""

@@ -31,19 +31,10 @@ def in_slicer(top, script, *arguments):
 
 
 @pytest.fixture(scope="module")
-def a_case(a_phantom, tmp_path_factory):
-    from hexafix.phantom import write_phantom
-
-    folder = tmp_path_factory.mktemp("slicer") / "bundle"
-    write_phantom(a_phantom, folder, image_format="nrrd")
-    return folder / "case.json"
-
-
-@pytest.fixture(scope="module")
-def a_walk(a_case, top):
+def a_walk(a_case_on_disk, top, tmp_path_factory):
     """From opening the case to the export; what was seen, and the export's folder."""
-    out = a_case.parent.parent / "export"
-    seen, errors = in_slicer(top, "walk_through_slicer.py", a_case, out)
+    out = tmp_path_factory.mktemp("slicer") / "export"
+    seen, errors = in_slicer(top, "walk_through_slicer.py", a_case_on_disk, out)
     assert "Traceback" not in errors
     return seen, out
 
@@ -153,14 +144,14 @@ def test_the_page_of_the_prescription_is_shown_whole(a_walk):
     assert height == pytest.approx(width * 297 / 210, abs=2)
 
 
-def test_the_export_is_the_command_lines_byte_for_byte(a_walk, a_case, tmp_path):
+def test_the_export_is_the_command_lines_byte_for_byte(a_walk, a_case_on_disk, tmp_path):
     from hexafix.case import load_case
     from hexafix.pipeline import plan_and_export
 
     seen, out = a_walk
     assert seen["blocked"] == ""
     assert seen["export_banners"] == []
-    plan_and_export(load_case(a_case), tmp_path / "plain")
+    plan_and_export(load_case(a_case_on_disk), tmp_path / "plain")
     names = {path.name for path in out.iterdir()}
     assert names == {path.name for path in (tmp_path / "plain").iterdir()}
     for name in names:
