@@ -243,8 +243,19 @@ def test_side_bone_and_fixator_are_chosen_and_never_assumed(panel, widgets, pres
     widgets.choose("limbBoneComboBox", 2)
     assert document("limb") == {"side": "right", "bone": "femur"}
     items = widgets.values["fixatorComboBox", "items"]
-    widgets.choose("fixatorComboBox", items.index("generic-6sps-160"))
+    title = "Generic 6-SPS hexapod, 160 mm rings (generic-6sps-160)"
+    widgets.choose("fixatorComboBox", items.index(title))
     assert document("fixator") == "generic-6sps-160"
+
+
+def test_a_fixator_of_the_cases_own_stands_in_the_list_by_its_name(panel, widgets, presenter):
+    presenter.set_fixator({"id": "own-160", "name": "Own hexapod"})
+    items, index = (widgets.values["fixatorComboBox", what] for what in ("items", "index"))
+    assert items[index] == "Own hexapod (definition in the case)"
+    widgets.choose("fixatorComboBox", index)
+    assert presenter.snapshot.document["fixator"]["id"] == "own-160"
+    presenter.set_fixator("generic-6sps-160")
+    assert not any("Own hexapod" in item for item in widgets.values["fixatorComboBox", "items"])
 
 
 def test_a_choice_that_is_not_taken_over_is_taken_back(panel, widgets, presenter):

@@ -3,10 +3,11 @@
 import json
 
 import pytest
+from hexafix.panel.load import shipped_titles
 from hexafix.presenter import Presenter
 from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.controls import NoViews
-from hexafix.web.panel.frame_choice import OWN, FrameChoice, frame_items, shipped_names
+from hexafix.web.panel.frame_choice import OWN, FrameChoice, frame_items
 from hexafix.web.state import PanelState
 
 SHIPPED = "generic-6sps-160"
@@ -66,8 +67,8 @@ def fixator(presenter):
 
 
 def test_every_shipped_frame_is_listed_by_its_name():
-    items = frame_items(shipped_names(), None)
-    assert {item["value"] for item in items} == set(shipped_names())
+    items = frame_items(shipped_titles(), None)
+    assert {item["value"] for item in items} == set(shipped_titles())
     assert {"title": f"Generic 6-SPS hexapod, 160 mm rings ({SHIPPED})", "value": SHIPPED} in items
 
 

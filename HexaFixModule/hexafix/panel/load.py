@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from hexafix.errors import InputError
 from hexafix.panel.binding import Binding, button, choice, field, idle, shown, table
 from hexafix.panel.text import at
-from hexafix.paths import resources
 from hexafix.strict_json import read_json_object
 
 if TYPE_CHECKING:
@@ -27,9 +27,19 @@ IMAGE_FILES = "Images (*.nrrd *.nhdr *.nii *.nii.gz *.mha *.mhd *.dcm);;All file
 
 
 @cache
-def shipped_fixators() -> tuple[str, ...]:
-    """Ids of the shipped fixator definitions."""
-    return tuple(sorted(path.stem for path in (resources() / "Hardware" / "Frames").glob("*.json")))
+def shipped_titles() -> Mapping[str, str]:
+    """What the list of fixators calls those that come with HexaFix, by id; read once."""
+    from hexafix.case import shipped_fixator_names
+
+    return {known: f"{name} ({known})" for known, name in shipped_fixator_names().items()}
+
+
+def own_title(given: Any) -> str:
+    """What the list calls the case's own fixator; empty where it has none of its own."""
+    if isinstance(given, Mapping):
+        called = given.get("name") or given.get("id") or "without a name"
+        return f"{called} (definition in the case)"
+    return f"{given} (definition in a file)" if given and given not in shipped_titles() else ""
 
 
 def with_own(items: tuple[str, ...], own: str) -> tuple[str, ...]:
@@ -52,11 +62,11 @@ def _bones(snapshot: Snapshot) -> tuple[str, ...]:
 
 def _fixator(snapshot: Snapshot) -> str:
     given = at(snapshot.document, "fixator")
-    return str(at(given, "id") or "own definition") if isinstance(given, dict) else str(given or "")
+    return own_title(given) or shipped_titles().get(given, "")
 
 
 def _fixators(snapshot: Snapshot) -> tuple[str, ...]:
-    return with_own((CHOOSE, *shipped_fixators()), _fixator(snapshot))
+    return with_own((CHOOSE, *shipped_titles().values()), _fixator(snapshot))
 
 
 def _set_side(panel: Panel, index: int) -> None:
@@ -70,9 +80,9 @@ def _set_bone(panel: Panel, index: int) -> None:
 
 
 def _set_fixator(panel: Panel, index: int) -> None:
-    chosen = _fixators(panel.snapshot)[index]
-    if chosen in shipped_fixators():
-        panel.presenter.set_fixator(chosen)
+    known = tuple(shipped_titles())
+    if 0 < index <= len(known):
+        panel.presenter.set_fixator(known[index - 1])
 
 
 def _fixator_file(panel: Panel, _: Any) -> None:

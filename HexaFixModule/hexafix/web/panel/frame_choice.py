@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.panel.load import own_title, shipped_titles
 from hexafix.strict_json import read_json_object
 from hexafix.web.files import CASE_SUFFIXES, start_folder
 from hexafix.web.panel.chooser import Chooser
@@ -62,7 +62,7 @@ class FrameChoice:
         ----------
         snapshot : Snapshot
         """
-        shipped, given = shipped_names(), snapshot.document.get("fixator")
+        shipped, given = shipped_titles(), snapshot.document.get("fixator")
         if snapshot.case_path != self._case:
             self._own, self._case = None, snapshot.case_path
         if given and not is_shipped(given, shipped):
@@ -101,14 +101,6 @@ class FrameChoice:
         self._context.act(take, field="fixator")
 
 
-@cache
-def shipped_names() -> Mapping[str, str]:
-    """Name by id of the definitions that come with HexaFix, read once."""
-    from hexafix.case import shipped_fixator_names
-
-    return shipped_fixator_names()
-
-
 def is_shipped(given: Any, shipped: Mapping[str, str]) -> bool:
     """Whether a case's fixator is one that comes with HexaFix."""
     return isinstance(given, str) and given in shipped
@@ -120,14 +112,11 @@ def frame_items(shipped: Mapping[str, str], own: Any) -> list[dict[str, str]]:
     Parameters
     ----------
     shipped : mapping of str to str
-        Name by id.
+        `shipped_titles`.
     own : str, mapping or None
         Path of a definition, a definition, or none.
     """
-    items = [{"title": f"{name} ({known})", "value": known} for known, name in shipped.items()]
-    if isinstance(own, Mapping):
-        called = own.get("name") or own.get("id") or "without a name"
-        items.append({"title": f"{called} (definition in the case)", "value": OWN})
-    elif own:
-        items.append({"title": f"{own} (definition in a file)", "value": OWN})
+    items = [{"title": title, "value": known} for known, title in shipped.items()]
+    if own:
+        items.append({"title": own_title(own), "value": OWN})
     return items
