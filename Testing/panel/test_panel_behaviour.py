@@ -203,6 +203,23 @@ def test_the_fragment_that_moves_is_never_guessed(panel, widgets, presenter):
     assert "correction" not in presenter.snapshot.document
 
 
+@pytest.mark.parametrize("begun", [1, 2, 4, 5])
+def test_a_click_never_mixes_its_axes_with_those_of_a_point_begun_by_typing(panel, widgets, begun):
+    widgets.click("addLandmarkButton")
+    (row,) = widgets.get("landmarksTable", "table")
+    typed = ["7.5"] * begun + [""] * (len(row) - begun)
+    widgets.fill("landmarksTable", [typed])
+    widgets.tick("pickLandmarkButton")
+    panel.clicked((1.0, 2.0, 3.0))
+    panel.clicked((4.0, 5.0, 6.0))
+    rows = widgets.get("landmarksTable", "table")
+    points = [row[k : k + 3] for row in rows for k in (0, 3)]
+    assert ["1", "2", "3"] in points
+    assert ["4", "5", "6"] in points
+    assert all(len(row) == 6 for row in rows)
+    assert sum(cell == "7.5" for row in rows for cell in row) == begun
+
+
 def test_landmarks_by_clicks_become_pairs(panel, widgets, document):
     widgets.choose("correctionKindComboBox", 2)
     widgets.choose("landmarksMovingComboBox", 1)

@@ -89,16 +89,18 @@ class RowsTable:
         panel.waiting_rows(self.widget).append(cells)
 
     def fill(self, panel: Panel, cells: Sequence[str]) -> None:
-        """Write texts into the first empty cells of the last waiting row, or of a new one."""
-        waiting = panel.waiting_rows(self.widget)
-        if not waiting:
+        """Write a point into the last waiting row where all its cells are empty, or a new one.
+
+        A point that was begun by typing is left alone: its axes would be mixed up.
+        """
+        waiting, size = panel.waiting_rows(self.widget), len(cells)
+        row = waiting[-1] if waiting else []
+        starts = (k for k in range(0, len(row), size) if not any(row[k : k + size]))
+        start = next(starts, None)
+        if start is None:
             self.add(panel)
-        row = waiting[-1]
-        if all(row):
-            self.add(panel)
-            row = waiting[-1]
-        start = next(place for place, cell in enumerate(row) if not cell)
-        row[start : start + len(cells)] = cells
+            row, start = waiting[-1], 0
+        row[start : start + size] = cells
         panel.refresh()
         self.typed(panel)
 
