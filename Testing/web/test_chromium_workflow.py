@@ -4,8 +4,6 @@ import csv
 import json
 import os
 import re
-import shutil
-import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -18,73 +16,6 @@ PACKAGE = Path(__file__).resolve().parents[2] / "HexaFixModule"
 FILES = ("prescription.pdf", "schedule.csv", "plan.json", "markers.mrk.json", "manifest.json")
 LONG_MS = 60_000
 POINT = re.compile(r"^(-?[0-9]+\.[0-9] ?){3}$")
-
-
-class Desk:
-    """A page with a workstation, spoken to by the names of its parts."""
-
-    def __init__(self, page, case):
-        self.page, self.case = page, case
-
-    def at(self, name):
-        return self.page.locator(f'[data-testid="{name}"]')
-
-    def click(self, name):
-        self.at(name).click()
-
-    def open(self, step):
-        if not self.at(f"body-{step}").is_visible():
-            self.click(f"open-{step}")
-        self.at(f"body-{step}").wait_for()
-
-    def wait(self, step, state):
-        """Wait until a step is in a state."""
-        found = f'[data-testid="step-{step}"][data-state="{state}"]'
-        self.page.wait_for_selector(found, timeout=LONG_MS)
-
-    def wait_for(self, selector):
-        self.page.wait_for_selector(selector, timeout=LONG_MS)
-
-    def write(self, field, text):
-        """Write into a field and leave it."""
-        entry = self.at(field).locator("input")
-        entry.fill(text)
-        entry.press("Tab")
-
-    def ball_of(self, number):
-        return self.at(f"number-{number}").get_attribute("data-ball")
-
-
-@pytest.fixture(scope="module")
-def a_desk(start_serving, a_case_on_disk, a_chromium, tmp_path_factory):
-    """A workstation of its own with the phantom's case open, in a page of 1440 × 900."""
-    folder = tmp_path_factory.mktemp("desk") / "phantom"
-    shutil.copytree(a_case_on_disk.parent, folder)
-    process, url = start_serving(folder / "case.json")
-    context = a_chromium.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
-    page = context.new_page()
-    page.said, page.asked = [], []
-    page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: page.said.append(str(error)))
-    page.on("request", lambda request: page.asked.append(request.url))
-    page.goto(url)
-    desk = Desk(page, folder / "case.json")
-    desk.wait("load", "done")
-    yield desk
-    context.close()
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=20)
-
-
-@pytest.fixture(scope="module")
-def a_planned_desk(a_desk):
-    """The same, with the prescription made and the side of the limb given a second time."""
-    a_desk.click("run-all")
-    a_desk.wait("export", "done")
-    a_desk.open("export")
-    a_desk.click("confirm-left")
-    a_desk.at("files").wait_for()
-    return a_desk
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,7 @@ def test_a_slice_says_the_coordinate_that_a_ball_in_it_has():
     assert slice_position(slice_node((-1, 0, 0), (0, 1, 0), (5.0, 6.0, -0.04))) == "S 0.0 mm"
 
 
-TOLD = re.compile(r"([LPS]) (-?[0-9]+\.[0-9]) mm in the middle, tilted ([0-9]+\.[0-9])°")
+TOLD = re.compile(r"([LPS]) (-?[0-9]+\.[0-9]) mm in the middle\ntilted ([0-9]+\.[0-9])°")
 
 
 @settings(max_examples=40, deadline=None)
@@ -116,7 +116,7 @@ def test_a_slice_is_called_tilted_only_where_its_coordinate_shows_it():
 
     # 25 mm from the middle to an edge: 0.05 mm at 0.1146 degrees
     assert at(0.11) == "S 20.0 mm"
-    assert at(0.12) == "S 20.0 mm in the middle, tilted 0.1°"
+    assert at(0.12) == "S 20.0 mm in the middle\ntilted 0.1°"
 
 
 def test_a_pixel_of_an_axial_slice_is_the_patient_point_under_it():

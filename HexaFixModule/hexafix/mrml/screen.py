@@ -82,7 +82,7 @@ def slice_position(slice_node: Any) -> str:
     if sum(map(abs, edges)) < TOLD_MM:
         return words
     tilt_deg = np.degrees(np.arccos(min(1.0, share[axis])))
-    return f"{words} in the middle, tilted {max(tilt_deg, 0.1):.1f}°"
+    return f"{words} in the middle\ntilted {max(tilt_deg, 0.1):.1f}°"
 
 
 def point_under(slice_node: Any, x: float, y: float) -> tuple[float, float, float]:

@@ -27,16 +27,19 @@ EDGES = ("left", "right", "top", "bottom")
 
 STYLE = """
 html { overflow: hidden; }
-.hxv-views-bar { display: flex; align-items: center; gap: 10px; padding: 6px 10px;
+.hxv-views-bar { display: flex; align-items: center; gap: 8px; padding: 6px 8px;
   flex-wrap: wrap; }
-.hxv-gap { width: 6px; }
-.hxv-hint { color: #ffe082; font-weight: 600; }
+.hxv-views-bar .v-field__input, .hxv-views-bar .v-text-field__suffix,
+.hxv-views-bar .v-text-field__prefix, .hxv-views-bar .v-select__selection { font-size: 14px; }
+.hxv-hint { position: absolute; z-index: 2; top: 30px; left: 50%; transform: translateX(-50%);
+  padding: 2px 10px; border-radius: 4px; background: rgba(0, 0, 0, 0.75); color: #ffe082;
+  font-weight: 600; pointer-events: none; white-space: nowrap; }
 .hxv-aim, .hxv-aim * { cursor: crosshair !important; }
 .hxv-over { position: absolute; pointer-events: none; color: #ffffff; user-select: none;
   text-shadow: 0 0 3px #000, 0 0 3px #000; font-size: 14px; line-height: 1.25; }
 .hxv-whole { position: absolute; inset: 0; pointer-events: none; }
 .hxv-name { top: 6px; left: 10px; font-weight: 600; }
-.hxv-position { top: 24px; left: 10px; font-variant-numeric: tabular-nums; }
+.hxv-position { top: 24px; left: 10px; white-space: pre-line; font-variant-numeric: tabular-nums; }
 .hxv-edge { font-size: 18px; font-weight: 700; color: #ffe082; }
 .hxv-left { left: 8px; top: 50%; transform: translateY(-50%); }
 .hxv-right { right: 8px; top: 50%; transform: translateY(-50%); }

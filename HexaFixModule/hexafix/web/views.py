@@ -94,6 +94,12 @@ class Views:
             with html.Div(style=whole, classes=("views_hint ? 'hxv-aim' : ''",)):
                 self._layouts.initialize_layout_grid(page)
                 html.Div(
+                    "{{ views_hint }}",
+                    v_show="views_hint",
+                    classes="hxv-hint",
+                    raw_attrs=['role="status"'],
+                )
+                html.Div(
                     "No CT is loaded",
                     v_if="!views_loaded",
                     classes="hxv-note",

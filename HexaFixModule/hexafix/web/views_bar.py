@@ -27,7 +27,6 @@ def build_bar(views: Views, state: Any) -> None:
         _layout_menu()
         _grey_values()
         _shown()
-        html.Div("{{ views_hint }}", classes="hxv-hint", raw_attrs=['role="status"'])
     _connect(views, state)
 
 
@@ -38,14 +37,13 @@ def _layout_menu() -> None:
         v_model=("views_layout",),
         items=("views_layouts", [{"title": words, "value": name} for name, words in NAMES.items()]),
         label="Layout",
-        style="max-width: 160px;",
+        style="max-width: 140px;",
         raw_attrs=['data-testid="views-layout"'],
         **SMALL,
     )
 
 
 def _grey_values() -> None:
-    from trame.widgets import html
     from trame.widgets import vuetify3 as v3
 
     presets = [{"title": "Suggested", "value": SUGGESTED}]
@@ -55,7 +53,7 @@ def _grey_values() -> None:
         v_model=("views_preset",),
         items=("views_presets", presets),
         label="Grey values",
-        style="max-width: 150px;",
+        style="max-width: 140px;",
         raw_attrs=['data-testid="views-preset"'],
         **SMALL,
     )
@@ -66,7 +64,7 @@ def _grey_values() -> None:
             type="number",
             prefix=letter,
             suffix="HU",
-            style="max-width: 130px;",
+            style="max-width: 120px;",
             raw_attrs=[f'aria-label="{words} in HU"', f'data-testid="{name}"'],
             **SMALL,
         )
@@ -79,7 +77,6 @@ def _grey_values() -> None:
         raw_attrs=['aria-label="Drag in a slice to change the grey values"'],
     ):
         pass
-    html.Span(classes="hxv-gap")
 
 
 def _shown() -> None:

@@ -49,11 +49,15 @@ class LoadStep:
 
         context, form = self._context, self._context.name.form
         with html.Div(classes="hxp-grid-2"):
-            text_field(context, "case-id", "Case id (no patient name)", f"{form}.case_id", self._id)
-            self._frame.build()
+            with html.Div(classes="hxp-whole"):
+                text_field(
+                    context, "case-id", "Case id (no patient name)", f"{form}.case_id", self._id
+                )
             sides = ("[{title: 'left', value: 'left'}, {title: 'right', value: 'right'}]",)
             choice(context, "limb-side", "Side", f"{form}.side", sides, self._side)
             choice(context, "limb-bone", "Bone", f"{form}.bone", ([*BONES],), self._bone)
+            with html.Div(classes="hxp-whole"):
+                self._frame.build()
         self._frame.build_file()
         title("CT")
         self._image()
@@ -81,7 +85,7 @@ class LoadStep:
 
         with html.Div(classes="hxp-row"):
             v.VTextField(
-                label="DICOM folder or image file on this computer",
+                label="DICOM folder or image file",
                 v_model=(self._name.path,),
                 density="compact",
                 variant="outlined",

@@ -49,14 +49,6 @@ class ScheduleStep:
                 self._set,
                 "'start_date', ",
             )
-            choice(
-                context,
-                "schedule-compensation",
-                "Compensation",
-                f"{form}.compensation",
-                COMPENSATION,
-                self._compensation,
-            )
             for key in NUMBERS_OF_SCHEDULE:
                 label, unit = LABELS[key]
                 field(
@@ -67,6 +59,15 @@ class ScheduleStep:
                     self._set,
                     f"'{key}', ",
                     suffix=unit,
+                )
+            with html.Div(classes="hxp-whole"):
+                choice(
+                    context,
+                    "schedule-compensation",
+                    "Compensation",
+                    f"{form}.compensation",
+                    COMPENSATION,
+                    self._compensation,
                 )
         note(
             "The fastest motion is that of the structures at risk, where the case names them, "
