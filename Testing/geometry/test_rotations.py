@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 from hexafix.errors import InputError
-from hexafix.geometry import Pose, angles_xyz_fixed_from_matrix, is_rotation, matrix_from_xyz_fixed
+from hexafix.geometry import (
+    Pose,
+    angles_xyz_fixed_from_matrix,
+    is_rotation,
+    matrix_from_rotation_vector,
+    matrix_from_xyz_fixed,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -16,6 +22,15 @@ number = st.floats(-500.0, 500.0)
 def test_the_matrix_is_scipys_for_fixed_axes(a, b, c):
     expected = Rotation.from_euler("xyz", [a, b, c]).as_matrix()
     assert np.abs(matrix_from_xyz_fixed([a, b, c]) - expected).max() < 1e-14
+
+
+component = st.floats(-4.0, 4.0) | st.floats(-1e-6, 1e-6) | st.just(0.0)
+
+
+@given(st.lists(st.tuples(component, component, component), min_size=1, max_size=4))
+def test_the_matrix_of_a_rotation_vector_is_scipys_however_small_the_turn(vectors):
+    expected = Rotation.from_rotvec(vectors).as_matrix()
+    assert np.abs(matrix_from_rotation_vector(vectors) - expected).max() < 1e-14
 
 
 @given(angle, st.floats(-1.57, 1.57), angle)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hexafix.correction.fragment import FragmentMotion, Moving
 from hexafix.errors import Fault, InputError
@@ -144,8 +144,8 @@ class Deformity:
         axis = np.cross([0.0, 0.0, self._outward], lean) / (size or 1.0)
         # external turns the front (−y) towards lateral: about +z on a left limb
         about_z = np.radians(self._signed("axial_rotation", "external")) * _lateral(side)
-        tilt = Rotation.from_rotvec(np.arctan(size) * axis)
-        rotation = (tilt * Rotation.from_rotvec([0.0, 0.0, about_z])).as_matrix()
+        turn = scipy.spatial.transform.Rotation.from_rotvec
+        rotation = (turn(np.arctan(size) * axis) * turn([0.0, 0.0, about_z])).as_matrix()
         there = self.corresponding_point_lps_mm(side=side)
         return Pose(rotation, there - rotation @ self.origin_lps_mm)
 

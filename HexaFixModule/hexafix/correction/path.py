@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hexafix.correction.fragment import Moving
 from hexafix.errors import InputError, Refused
-from hexafix.geometry import Pose
+from hexafix.geometry import Pose, matrix_from_rotation_vector
 from hexafix.hardware import Fixator
-from hexafix.kinematics.newton import rotations_of
 
 MAX_DAYS = 365
 """A schedule longer than this is a mistake in the rate or in the target."""
@@ -276,7 +275,7 @@ def _screw(
     """Start · exp(s twist) for all s at once."""
     shift, turn = twist[:3], twist[3:]
     angle = float(np.linalg.norm(turn))
-    rotations = rotations_of(s[:, None] * turn)
+    rotations = matrix_from_rotation_vector(s[:, None] * turn)
     if angle < 1e-9:
         moved = s[:, None] * shift
     else:

@@ -4,6 +4,7 @@ from hexafix.geometry.pose import Pose
 from hexafix.geometry.rotations import (
     angles_xyz_fixed_from_matrix,
     is_rotation,
+    matrix_from_rotation_vector,
     matrix_from_xyz_fixed,
     skew,
 )
@@ -12,6 +13,7 @@ __all__ = [
     "Pose",
     "angles_xyz_fixed_from_matrix",
     "is_rotation",
+    "matrix_from_rotation_vector",
     "matrix_from_xyz_fixed",
     "skew",
 ]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erf
 
 
 def blurred_ball(
@@ -33,4 +33,4 @@ def blurred_ball(
     width = np.sqrt(2.0) * sigma_mm
     near, far = (radius_mm - r) / width, (radius_mm + r) / width
     shell = sigma_mm / (np.sqrt(2.0 * np.pi) * r) * (np.exp(-(near**2)) - np.exp(-(far**2)))
-    return 0.5 * (erf(near) + erf(far)) - shell
+    return 0.5 * (scipy.special.erf(near) + scipy.special.erf(far)) - shell

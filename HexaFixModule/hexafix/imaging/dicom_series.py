@@ -15,6 +15,7 @@ from hexafix.errors import Fault, ImageRefused, InputError, MissingLibrary
 from hexafix.imaging.dicom_header import NotAnImage, SliceHeader, read_headers
 from hexafix.imaging.header_words import shown_image_type, shown_modality
 from hexafix.imaging.hounsfield import faults_of_values
+from hexafix.imaging.image_path import require_path
 from hexafix.imaging.pixel_data import faults_of_length
 from hexafix.imaging.slice_stack import TILT_TOLERANCE_DEG, arrange, listed
 from hexafix.progress import Progress, silent
@@ -182,18 +183,6 @@ def list_series(folder: str | Path) -> tuple[SeriesSummary, ...]:
         If the folder cannot be read.
     """
     return summarise(scan(require_path(Path(folder))).slices)
-
-
-def require_path(path: Path) -> Path:
-    """The path itself; refused if nothing is there."""
-    if not path.exists():
-        raise InputError.of(
-            "image-not-found",
-            "the image file or folder does not exist",
-            where="image",
-            next_step="check the path; image.path is relative to the case file",
-        )
-    return path
 
 
 def summarise(slices: Iterable[SliceHeader]) -> tuple[SeriesSummary, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexafix.errors import Fault, InputError
-from hexafix.imaging.slice_stack import TILT_TOLERANCE_DEG
+from hexafix.imaging.gantry_tilt import TILT_TOLERANCE_DEG
 
 CORNER_TOLERANCE_MM = 0.01
 

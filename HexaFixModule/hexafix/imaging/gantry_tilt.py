@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import spline_filter1d
 
 TILT_TOLERANCE_DEG = 0.05
 """Up to here the shear stays in the affine: a slice is at most 0.001 of its distance aside."""
@@ -161,7 +161,7 @@ def _between(values: NDArray, fraction: float, axis: int) -> NDArray:
     edges = [(_EDGE, _EDGE), (0, 0)]
     # Single precision keeps a thousandth of a HU, and half the memory traffic.
     longer = np.pad(rows.astype(np.float32), edges, mode="reflect", reflect_type="odd")
-    terms = spline_filter1d(longer, order=3, axis=0, output=np.float32, mode="mirror")
+    terms = scipy.ndimage.spline_filter1d(longer, order=3, axis=0, output=np.float32, mode="mirror")
     count = len(rows) - 1
     before, after = 1.0 - fraction, fraction
     # The cubic B-spline at the distances of the four nearest voxels.

@@ -25,8 +25,7 @@ from hexafix.imaging.isolation import run_isolated
 from hexafix.imaging.metaimage_header import read_metaimage_header
 from hexafix.imaging.nifti_header import read_nifti_header
 from hexafix.imaging.nrrd_header import read_nrrd_header
-from hexafix.imaging.pixel_data import MAX_VOXELS
-from hexafix.imaging.volume import ImageSource, Volume
+from hexafix.imaging.volume import MAX_VOXELS, ImageSource, Volume
 from hexafix.progress import Progress
 
 _INT16 = np.iinfo(np.int16)

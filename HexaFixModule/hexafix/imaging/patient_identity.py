@@ -17,7 +17,8 @@ from pydicom.tag import Tag
 from pydicom.valuerep import TEXT_VR_DELIMS, PersonName
 
 from hexafix.errors import HexaFixError, ImageRefused, InputError
-from hexafix.imaging.dicom_series import choose, require_path, scan
+from hexafix.imaging.dicom_series import choose, scan
+from hexafix.imaging.image_path import require_path
 from hexafix.imaging.itk_file import format_of
 from hexafix.progress import Progress, silent
 

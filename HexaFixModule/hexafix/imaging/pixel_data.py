@@ -21,11 +21,10 @@ from hexafix.imaging.gantry_tilt import OrthogonalGrid
 from hexafix.imaging.hounsfield import AIR_HU, NeedsFloat, convert, stored_type
 from hexafix.imaging.slice_agreement import listed
 from hexafix.imaging.slice_stack import SliceStack
+from hexafix.imaging.volume import MAX_VOXELS
 from hexafix.progress import Progress
 from hexafix.threads import thread_count
 
-# Far above any CT of a limb (1024 x 1024 x 1500), far below what would exhaust a workstation.
-MAX_VOXELS = 1_600_000_000
 _BATCH = 8
 _CHILD_BATCH = 16
 _POLL_SECONDS = 0.05

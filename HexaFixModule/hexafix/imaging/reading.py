@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexafix.errors import InputError
-from hexafix.imaging.dicom_series import require_path
-from hexafix.imaging.dicom_volume import read_dicom
+from hexafix.imaging.image_path import require_path
 from hexafix.imaging.itk_file import format_of, read_itk_file
 from hexafix.imaging.volume import Volume
 from hexafix.progress import Progress, silent
@@ -51,4 +50,7 @@ def read_volume(
                 next_step="leave out the SeriesInstanceUID",
             )
         return read_itk_file(path, progress)
+    # Not at the top: pydicom takes long to import, and the other files need none of it.
+    from hexafix.imaging.dicom_volume import read_dicom
+
     return read_dicom(path, series_instance_uid, progress)

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from hexafix.errors import InputError
-from hexafix.imaging.dicom_series import SeriesSummary, require_path, scan, summarise
+from hexafix.imaging.dicom_series import SeriesSummary, scan, summarise
+from hexafix.imaging.image_path import require_path
 from hexafix.progress import Progress, silent
 
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+MAX_VOXELS = 1_600_000_000
+"""Far above any CT of a limb (1024 × 1024 × 1500), far below what would exhaust a workstation."""
+
 
 @dataclass(frozen=True, eq=False)
 class Acquisition:

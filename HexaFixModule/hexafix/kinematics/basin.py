@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexafix.geometry import Pose
+from hexafix.geometry import Pose, matrix_from_rotation_vector
 from hexafix.hardware import Fixator
-from hexafix.kinematics.newton import rotations_of, solve_rows
+from hexafix.kinematics.newton import solve_rows
 
 SPREAD_MM, SPREAD_RAD = 15.0, float(np.radians(10.0))
 """How far the second starts lie from the solution: ten times the largest error that the gate on
@@ -70,7 +70,7 @@ def second_starts(
     batch = solve_rows(
         lengths,
         fixator,
-        start_rotations=solution.rotation @ rotations_of(turns),
+        start_rotations=solution.rotation @ matrix_from_rotation_vector(turns),
         start_positions=solution.position_mm + shifts,
     )
     arrived = batch.arrived

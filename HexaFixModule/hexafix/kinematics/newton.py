@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg.lapack import dgesv
 
 from hexafix.geometry import Pose
 from hexafix.hardware import Fixator
@@ -101,7 +101,7 @@ def solve_one(lengths_mm: NDArray[np.float64], fixator: Fixator, *, start: Pose)
         if worst <= TOLERANCE_MM or not worst < np.inf or iteration == MAX_ITERATIONS:
             break
         # LAPACK without numpy's wrapper, whose overhead is longer than the solution of six rows
-        *_, step, singular = dgesv(columns.T, missing)
+        *_, step, singular = scipy.linalg.lapack.dgesv(columns.T, missing)
         if singular:
             break
         x, y, z, u, v, w = step.tolist()
@@ -266,21 +266,6 @@ def _rotations(
     out[0, 1], out[1, 0] = uv - cw, uv + cw
     out[0, 2], out[2, 0] = uw + cv, uw - cv
     out[1, 2], out[2, 1] = vw - cu, vw + cu
-    return out
-
-
-def rotations_of(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation matrices, shape (M, 3, 3), of rotation vectors, shape (M, 3), radians."""
-    u, v, w = vectors.T
-    angle = np.sqrt(u * u + v * v + w * w)
-    s = np.sinc(angle / np.pi)
-    c = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    k = np.cos(angle)
-    out = np.empty((len(vectors), 3, 3))
-    out[:, 0, 0], out[:, 1, 1], out[:, 2, 2] = k + c * u * u, k + c * v * v, k + c * w * w
-    out[:, 0, 1], out[:, 1, 0] = c * u * v - s * w, c * u * v + s * w
-    out[:, 0, 2], out[:, 2, 0] = c * u * w + s * v, c * u * w - s * v
-    out[:, 1, 2], out[:, 2, 1] = c * v * w - s * u, c * v * w + s * u
     return out
 
 

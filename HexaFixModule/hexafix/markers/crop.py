@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, map_coordinates, spline_filter
 
 from hexafix.imaging.volume import Volume
 
@@ -50,7 +50,7 @@ class Crop:
 
     @cached_property
     def _spline(self) -> NDArray[np.float64]:
-        return spline_filter(self.voxels, order=3, mode="mirror")
+        return scipy.ndimage.spline_filter(self.voxels, order=3, mode="mirror")
 
     def sample(
         self, points_mm: NDArray[np.float64], order: Literal[1, 3] = 3
@@ -58,7 +58,9 @@ class Crop:
         """HU at LPS points, shape (..., 3) to (...), by the spline of order 3 or 1."""
         index = (self.volume.ijk_from_lps(points_mm) - self.first_ijk)[..., ::-1].reshape(-1, 3)
         source = self._spline if order == 3 else self.voxels
-        values = map_coordinates(source, index.T, order=order, mode="mirror", prefilter=False)
+        values = scipy.ndimage.map_coordinates(
+            source, index.T, order=order, mode="mirror", prefilter=False
+        )
         return values.reshape(points_mm.shape[:-1])
 
     @cached_property
@@ -103,7 +105,9 @@ class Crop:
         if acquired is None:
             return clipped
         i, j, _ = np.abs(self.volume.direction.T @ acquired.ijk_to_lps[:3, 2]) > MOVED_MM
-        return binary_dilation(clipped, np.ones((1, 3 if j else 1, 3 if i else 1), bool))
+        return scipy.ndimage.binary_dilation(
+            clipped, np.ones((1, 3 if j else 1, 3 if i else 1), bool)
+        )
 
     @cached_property
     def is_mask(self) -> bool:

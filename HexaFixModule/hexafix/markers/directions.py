@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 
 @cache
@@ -33,11 +33,11 @@ def sphere_directions(count: int) -> NDArray[np.float64]:
 
 
 @cache
-def neighbour_average(count: int, sigma_rad: float) -> csr_array:
+def neighbour_average(count: int, sigma_rad: float) -> scipy.sparse.csr_array:
     """Gaussian average over neighbouring directions, sparse shape (count, count), rows sum to 1."""
     directions = sphere_directions(count)
     cosine = np.clip(directions @ directions.T, -1.0, 1.0)
     weight = np.exp(-0.5 * (np.arccos(cosine) / sigma_rad) ** 2)
     weight[weight < 0.02] = 0.0
     weight /= weight.sum(axis=1, keepdims=True)
-    return csr_array(weight)
+    return scipy.sparse.csr_array(weight)

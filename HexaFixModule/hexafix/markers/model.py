@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from hexafix.markers.crop import Crop
 
@@ -176,7 +176,8 @@ def _ball_and_slopes(
         sigma = np.sqrt(plane**2 * (1.0 - tilt) + along**2 * tilt)
         bell = np.exp(-0.5 * ((radius - r) / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma)
         share += weight * (
-            0.5 * (1.0 + erf((radius - r) / (np.sqrt(2.0) * sigma))) - sigma**2 / r * bell
+            0.5 * (1.0 + scipy.special.erf((radius - r) / (np.sqrt(2.0) * sigma)))
+            - sigma**2 / r * bell
         )
         by_r = bell * (-radius / r + (sigma / r) ** 2)
         by_sigma = (radius - r) / sigma * by_r - bell * sigma * radius / r**2

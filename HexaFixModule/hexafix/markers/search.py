@@ -9,8 +9,8 @@ rays through every voxel, about its own centre and at its own half height.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from hexafix.imaging.volume import Volume
 from hexafix.markers.directions import sphere_directions
@@ -150,7 +150,7 @@ def _far_apart(points: NDArray[np.float64], reach: float) -> NDArray[np.int64]:
     """Indices, in order, of points farther than `reach` from every one kept before them."""
     kept = np.ones(len(points), bool)
     if len(points) > 1:
-        pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+        pairs = scipy.spatial.cKDTree(points).query_pairs(reach, output_type="ndarray")
         pairs = pairs[np.argsort(pairs.min(axis=1), kind="stable")]
         for first, second in zip(pairs.min(axis=1), pairs.max(axis=1), strict=True):
             if kept[first]:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from hexafix.errors import ImageRefused, InputError, LayoutRejected, Refused
-from hexafix.geometry import Pose, skew
+from hexafix.geometry import Pose, matrix_from_rotation_vector, skew
 from hexafix.hardware import MarkerLayout
 from hexafix.recognition.rigid import (
     MIN_TRIANGLE_HEIGHT_MM,
@@ -124,7 +123,7 @@ def ring_poses(
         normal, gradient, chi2 = _normal_equations(points, r, total, rotation, position)
         step = np.linalg.solve(normal, -gradient[..., None])[..., 0]
         position = position + np.einsum("kij,kj->ki", rotation, step[:, :3])
-        rotation = rotation @ Rotation.from_rotvec(step[:, 3:]).as_matrix()
+        rotation = rotation @ matrix_from_rotation_vector(step[:, 3:])
         if np.all(np.abs(step[:, :3]) < STEP_MM) and np.all(np.abs(step[:, 3:]) < STEP_RAD):
             covariance = np.linalg.inv(normal)
             return rotation, position, 0.5 * (covariance + np.swapaxes(covariance, 1, 2)), chi2
