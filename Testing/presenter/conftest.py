@@ -6,6 +6,7 @@ one reads, so that a value of older inputs, or of too few, shows.
 
 import copy
 import hashlib
+import itertools
 import json
 import threading
 from pathlib import Path
@@ -222,6 +223,19 @@ class FakeEngine:
         return {"layout_proximal": "<svg/>"}
 
 
+def read_fake_scene(path, *, progress=silent):
+    """A scene's file as a test writes it: JSON, its CT the value that the fake engine read."""
+    from hexafix.presenter.scenes import SceneContent
+
+    progress("open the scene", 0.0)
+    try:
+        held = json.loads(path.read_text())
+    except ValueError:
+        raise Refused.of("bundle-damaged", "no scene", hazard="H49") from None
+    made = held.pop("volume")
+    return SceneContent(**held, volume=None if made is None else SimpleNamespace(made=made))
+
+
 MARKER = {"radius_mm": 100.0, "height_mm": 20.0}
 CASE = {
     "schema_version": 1,
@@ -260,6 +274,38 @@ def an_engine():
 @pytest.fixture
 def a_fake_engine_class():
     return FakeEngine
+
+
+@pytest.fixture
+def a_fake_scene_reader():
+    return read_fake_scene
+
+
+@pytest.fixture
+def save_fake_scene():
+    """Saves what `SceneSync` saves: case, hash, CT, what is done; returns what was written."""
+    from hexafix.presenter import Step, StepState
+
+    def save(presenter, path, **other):
+        document, sha256 = presenter.case_for_scene()
+        document["image"] = {"path": "volume-node", "series_instance_uid": None}
+        done = list(
+            itertools.takewhile(lambda v: v.state == StepState.DONE, presenter.snapshot.steps)
+        )
+        volume = presenter.value(Step.LOAD) if presenter.is_fresh(Step.LOAD) else None
+        held = {
+            "document": document,
+            "case_sha256": sha256 or digest(document),
+            "volume": volume and volume.made,
+            "relaxed": presenter.version.relaxed,
+            "step": presenter.snapshot.current.value,
+            "computed_to": done[-1].step.value if done else "",
+            "split_fraction": presenter.split_fraction,
+        }
+        path.write_text(json.dumps({**held, **other}))
+        return {**held, **other}
+
+    return save
 
 
 @pytest.fixture

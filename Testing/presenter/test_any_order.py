@@ -1,6 +1,7 @@
 """Edits, undo, redo and work in any order: no value of older inputs ever passes for fresh (H40)."""
 
 import copy
+import hashlib
 import json
 import shutil
 import tempfile
@@ -11,16 +12,19 @@ import pytest
 from hexafix.case import case_from_document
 from hexafix.errors import Refused
 from hexafix.presenter import Presenter, Step, StepState
+from hexafix.presenter.scenes import with_scenes
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
     initialize,
     invariant,
+    precondition,
     rule,
     run_state_machine_as_test,
 )
 
+STEPS = list(Step)
 NUMBERS = [str(number) for number in range(1, 9)]
 STRUTS = st.integers(1, 6)
 READINGS = st.sampled_from([168.0, 170.5, 181.5, 999.0])
@@ -44,7 +48,7 @@ def right_parts(document):
 
 def straight_chain(engine, case, numbering, present):
     """The chain without presenter, cache or a case of parts; a refusal ends it."""
-    raw, relaxed = present
+    _, relaxed, sha256 = present
     volume = engine.read_image(case.image_path, series_instance_uid=None)
     balls = engine.find_case_balls(
         volume,
@@ -64,7 +68,8 @@ def straight_chain(engine, case, numbering, present):
     if case.strut_readings_mm is not None:
         made[Step.READINGS] = engine.weigh_document(case, poses)
     made[Step.CORRECTION] = engine.preview_target(case, poses)
-    plan = engine.plan_recognised(case.read_from(raw), poses, accept_relaxed_layout=relaxed)
+    named = replace(case, case_sha256=sha256)
+    plan = engine.plan_recognised(named, poses, accept_relaxed_layout=relaxed)
     return {**made, Step.SCHEDULE: plan, Step.EXPORT: engine.prescribe(plan)}
 
 
@@ -75,19 +80,27 @@ def made_of(value):
 class AnyOrder(RuleBasedStateMachine):
     engine_class = None
     case = None
+    read_scene = None
+    save_scene = None
 
-    @initialize(planned=st.booleans())
-    def open(self, planned):
+    @initialize(planned=st.booleans(), reopened=st.booleans())
+    def open(self, planned, reopened):
         self.folder = Path(tempfile.mkdtemp(prefix="hexafix-"))
         (self.folder / "ct.txt").write_text("one image")
         (self.folder / "case.json").write_text(json.dumps(self.case))
-        self.presenter = Presenter(engine=self.engine_class(), threaded=False)
+        self.presenter = Presenter(
+            engine=self.engine_class(), threaded=False, read_scene=self.read_scene
+        )
         assert self.presenter.open_case(self.folder / "case.json")
         self.past, self.future, self.exports = [], [], 0
+        self.scenes, self.told = [], {}
+        self.given = self.case["strut_readings_mm"]
         if planned:
             self.presenter.run_all()
             self.presenter.confirm_side("left")
             assert self.presenter.snapshot.can_export
+        if planned and reopened:
+            self.go_on_in_a_scene()
 
     def teardown(self):
         if hasattr(self, "presenter"):
@@ -96,7 +109,8 @@ class AnyOrder(RuleBasedStateMachine):
 
     @property
     def present(self):
-        return self.presenter.version.raw, self.presenter.version.relaxed
+        version = self.presenter.version
+        return version.raw, version.relaxed, version.sha256
 
     def act(self, edit):
         """Do an edit, and keep what undo must bring back."""
@@ -217,7 +231,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(text=st.sampled_from(["one image", "another image"]))
     def change_the_image(self, text):
         (self.folder / "ct.txt").write_text(text)
-        self.presenter.load_image(self.folder / "ct.txt")
+        self.act(lambda p: p.load_image(self.folder / "ct.txt"))
 
     @rule(side=st.sampled_from(["left", "right"]))
     def confirm_side(self, side):
@@ -231,15 +245,51 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule()
     def save(self):
-        assert self.presenter.save_case()
+        named = None if self.presenter.case_path else self.folder / "case.json"
+        assert self.presenter.save_case(named)
         saved = (self.folder / "case.json").read_bytes()
         given = json.loads(self.present[0])["strut_readings_mm"]
-        known = (None, self.case["strut_readings_mm"], self.presenter.readings_repeated)
+        known = (None, self.given, self.presenter.readings_repeated)
         if given in known:
             assert saved == self.present[0]
+            assert hashlib.sha256(saved).hexdigest() == self.present[2]
         else:
             once = {"schema_version": 2, "readings_to_repeat": True}
             assert json.loads(saved) == {**json.loads(self.present[0]), **once}
+
+    @precondition(lambda self: self.presenter.is_fresh(Step.LOAD))
+    @rule()
+    def save_a_scene(self):
+        path = self.folder / f"scene-{len(self.scenes)}.mrb"
+        held = type(self).save_scene(self.presenter, path)
+        made = {s: made_of(self.presenter.value(s)) for s in Step if self.presenter.is_done(s)}
+        self.scenes.append((path, held, made, self.presenter.snapshot.confirmed["readings"]))
+
+    @precondition(lambda self: self.presenter.is_fresh(Step.LOAD))
+    @rule()
+    def go_on_in_a_scene(self):
+        self.save_a_scene()
+        self.open_a_scene(-1)
+
+    @precondition(lambda self: self.scenes)
+    @rule(which=st.integers(0, 3))
+    def open_a_scene(self, which):
+        path, held, made, repeated = self.scenes[which % len(self.scenes)]
+        assert self.presenter.open_scene(path)
+        self.past, self.future = [], []
+        raw, relaxed, sha256 = self.present
+        image = {"path": path.name, "series_instance_uid": None}
+        wanted = {**held["document"], "image": image}
+        once = wanted.pop("readings_to_repeat", False)
+        assert (json.loads(raw), relaxed) == (wanted, held["relaxed"])
+        assert once or sha256 == held["case_sha256"]
+        self.told[raw] = sha256
+        self.given = None if once else wanted["strut_readings_mm"]
+        assert once != repeated or wanted["strut_readings_mm"] is None
+        for step in STEPS[: STEPS.index(held["computed_to"]) + 1]:
+            # what was done is done again, of the same inputs to the last byte
+            assert made_of(self.presenter.value(step)) == made[step] or once
+        assert self.presenter.side_answer is None
 
     @rule()
     def export(self):
@@ -262,7 +312,13 @@ class AnyOrder(RuleBasedStateMachine):
         case = case_from_document(
             right_parts(document), folder=self.folder, needs_image=False, plannable=False
         )
-        return straight_chain(self.engine_class(), case, document.get("numbering"), self.present)
+        engine = with_scenes(self.engine_class(), type(self).read_scene)
+        return straight_chain(engine, case, document.get("numbering"), self.present)
+
+    @invariant()
+    def a_plan_names_the_bytes_of_its_case_or_what_its_scene_told_of_the_same_bytes(self):
+        raw, _, sha256 = self.present
+        assert sha256 in (hashlib.sha256(raw).hexdigest(), self.told.get(raw))
 
     @invariant()
     def an_export_is_possible_only_of_the_present_inputs(self):
@@ -276,7 +332,7 @@ class AnyOrder(RuleBasedStateMachine):
         assert not any(table.stale for table in snapshot.tables.values())
         assert files["plan.json"].decode() == self.straight()[Step.EXPORT].made
         assert self.presenter.side_answer[0] == document["limb"]["side"]
-        typed = document["strut_readings_mm"] != self.case["strut_readings_mm"]
+        typed = document["strut_readings_mm"] != self.given
         assert not typed or self.presenter.readings_repeated == document["strut_readings_mm"]
         assert document.get("ring_front_confirmed") is not False
 
@@ -290,8 +346,14 @@ class AnyOrder(RuleBasedStateMachine):
 
 
 @pytest.fixture
-def machine(a_fake_engine_class, a_case):
-    return type("Machine", (AnyOrder,), {"engine_class": a_fake_engine_class, "case": a_case})
+def machine(a_fake_engine_class, a_case, a_fake_scene_reader, save_fake_scene):
+    given = {
+        "engine_class": a_fake_engine_class,
+        "case": a_case,
+        "read_scene": staticmethod(a_fake_scene_reader),
+        "save_scene": staticmethod(save_fake_scene),
+    }
+    return type("Machine", (AnyOrder,), given)
 
 
 def test_no_order_of_edits_undo_and_work_leaves_a_stale_result_marked_fresh(machine):

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 from xml.parsers import expat
 
-from hexafix.errors import Fault, HexaFixError, Refused
-from hexafix.imaging import read_volume
+from hexafix.errors import Cancelled, Fault, HexaFixError, Refused
+from hexafix.imaging import Volume, read_volume
 from hexafix.mrml.mesh_file import check_mesh
 from hexafix.mrml.parameter_node import MODULE, PARAMETERS
+from hexafix.progress import Progress, silent
 from hexafix.strict_json import read_json_object
 
 SCENE_FILE = "scene.mrml"
@@ -47,7 +48,9 @@ _TRANSFORM = re.compile(
 NEXT_STEP = "open only bundles that HexaFix saved, and that came a way you trust"
 
 
-def check_content(folder: Path, files: Iterable[PurePosixPath]) -> None:
+def check_content(
+    folder: Path, files: Iterable[PurePosixPath], *, progress: Progress = silent
+) -> dict[PurePosixPath, Volume]:
     """Check every file of an unpacked bundle.
 
     Parameters
@@ -56,6 +59,13 @@ def check_content(folder: Path, files: Iterable[PurePosixPath]) -> None:
         Where the bundle was unpacked.
     files : iterable of PurePosixPath
         Its files, relative to `folder`.
+    progress : Progress, optional
+        Of the image's reading.
+
+    Returns
+    -------
+    dict of PurePosixPath
+        Its images, which had to be read whole.
 
     Raises
     ------
@@ -63,7 +73,12 @@ def check_content(folder: Path, files: Iterable[PurePosixPath]) -> None:
         With what is wrong, a fault for each file.
     """
     files = list(files)
-    faults = []
+    faults: list[Fault] = []
+    images: dict[PurePosixPath, Volume] = {}
+
+    def check_image(path: Path) -> None:
+        images[PurePosixPath(path.relative_to(folder))] = _check_image(path, progress)
+
     scenes = [path for path in files if path.name == SCENE_FILE]
     if len(scenes) != 1 or len(scenes[0].parts) > 2:
         faults.append(_fault("bundle-damaged", "the bundle holds no scene, or several", "H49"))
@@ -72,17 +87,20 @@ def check_content(folder: Path, files: Iterable[PurePosixPath]) -> None:
     # The image last, and only if all else is sound: reading it takes the longest.
     for path in sorted(files, key=lambda path: _kind(path) == ".nrrd"):
         if _kind(path) != ".nrrd" or not faults:
-            faults += _file_faults(folder, path)
+            check = check_image if _kind(path) == ".nrrd" else _CHECKS.get(_kind(path))
+            faults += _file_faults(check, folder / path)
     if faults:
         raise Refused(*dict.fromkeys(faults))
+    return images
 
 
-def _file_faults(folder: Path, path: PurePosixPath) -> Sequence[Fault]:
-    check = _check_of(path)
+def _file_faults(check: Callable[[Path], None] | None, path: Path) -> Sequence[Fault]:
     if check is None:
         return [_fault("bundle-foreign-file", "a file is of no kind of ours", "H49")]
     try:
-        check(folder / path)
+        check(path)
+    except Cancelled:
+        raise
     except HexaFixError as error:
         return error.faults
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, AttributeError):
@@ -90,24 +108,13 @@ def _file_faults(folder: Path, path: PurePosixPath) -> Sequence[Fault]:
     return []
 
 
-def _kind(path: PurePosixPath) -> str:
+def _kind(path: PurePath) -> str:
     return ".mrk.json" if path.name.endswith(".mrk.json") else path.suffix
 
 
-def _check_of(path: PurePosixPath) -> Callable[[Path], None] | None:
-    return {
-        ".nrrd": _check_image,
-        ".vtp": check_mesh,
-        ".mrk.json": _check_points,
-        ".tfm": _check_transform,
-        ".tsv": _check_table,
-        ".mrml": _check_scene_size,
-    }.get(_kind(path))
-
-
-def _check_image(path: Path) -> None:
-    # Reads it in a process of its own; also refuses data outside the file (H50).
-    read_volume(path)
+def _check_image(path: Path, progress: Progress) -> Volume:
+    # In a process of its own; also refuses data outside the file (H50).
+    return read_volume(path, progress=progress)
 
 
 def _check_points(path: Path) -> None:
@@ -144,6 +151,15 @@ def _check_table(path: Path) -> None:
 
 def _check_scene_size(path: Path) -> None:
     _text(path)
+
+
+_CHECKS: dict[str, Callable[[Path], None]] = {
+    ".vtp": check_mesh,
+    ".mrk.json": _check_points,
+    ".tfm": _check_transform,
+    ".tsv": _check_table,
+    ".mrml": _check_scene_size,
+}
 
 
 def _text(path: Path) -> str:

@@ -275,17 +275,21 @@ class SceneLogic:
 
     # ------------------------------------------------------------- the case
 
-    def save_case_into(self, case: Case | Mapping[str, Any], **shell: Any) -> Any:
+    def save_case_into(
+        self, case: Case | Mapping[str, Any], *, case_sha256: str | None = None, **shell: Any
+    ) -> Any:
         """Put the case, or a draft of its document, into the parameter node.
 
         Parameters
         ----------
         case : Case or mapping
+        case_sha256 : str, optional
+            Hash of the case file that a draft is the content of.
         **shell
             Other fields of `parameter_node.ShellParameters`, by name.
         """
         shell.setdefault("inputVolume", self.volume_node())
-        return parameter_node.store_case(self.scene, case, **shell)
+        return parameter_node.store_case(self.scene, case, case_sha256=case_sha256, **shell)
 
     def case_from_scene(self, *, plannable: bool = True) -> Case:
         """The case that the scene holds, checked as a case file is."""

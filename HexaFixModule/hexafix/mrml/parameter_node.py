@@ -54,6 +54,8 @@ class ShellParameters:
     acceptRelaxedLayout : bool
     playbackRow : int
         -1: what the CT shows.
+    computedTo : str
+        The last step of those whose results were done one after the other; empty: none.
     """
 
     caseJson: str = ""  # noqa: N815
@@ -64,6 +66,7 @@ class ShellParameters:
     splitFraction: float = 0.5  # noqa: N815
     acceptRelaxedLayout: bool = False  # noqa: N815
     playbackRow: int = -1  # noqa: N815
+    computedTo: str = ""  # noqa: N815
 
 
 def parameter_node(scene: Any) -> Any:
@@ -170,8 +173,33 @@ def without_image(document: Mapping[str, Any]) -> dict[str, Any]:
     return bare
 
 
-def store_case(scene: Any, case: Case | Mapping[str, Any], **shell: Any) -> Any:
-    """Put a case or a draft, and other `ShellParameters` by name, into the parameter node."""
+def shell_of(held: Mapping[str, str]) -> ShellParameters:
+    """The parameters of a scene that no MRML reads, by name; what it lacks keeps its default.
+
+    Raises
+    ------
+    InputError
+        If a value is not one of its kind.
+    """
+    hints = typing.get_type_hints(ShellParameters)
+    found = {name: _value(raw, hints[name], name) for name, raw in held.items() if raw}
+    return ShellParameters(**found)
+
+
+def store_case(
+    scene: Any, case: Case | Mapping[str, Any], *, case_sha256: str | None = None, **shell: Any
+) -> Any:
+    """Put a case or a draft into the parameter node.
+
+    Parameters
+    ----------
+    scene : vtkMRMLScene
+    case : Case or mapping
+    case_sha256 : str, optional
+        Hash of the case file that a draft is the content of; of what is stored if not given.
+    **shell
+        Other `ShellParameters` by name.
+    """
     node = parameter_node(scene)
     kept = read(node, ShellParameters)
     whole = isinstance(case, Case)
@@ -180,7 +208,7 @@ def store_case(scene: Any, case: Case | Mapping[str, Any], **shell: Any) -> Any:
         kept,
         caseJson=text,
         caseJsonSha256=_sha256(text),
-        caseFileSha256=case.case_sha256 if whole else _sha256(text),
+        caseFileSha256=case.case_sha256 if whole else case_sha256 or _sha256(text),
         **shell,
     )
     if changed != kept:
@@ -208,16 +236,26 @@ def stored_case(scene: Any, *, plannable: bool = True) -> Case:
     node = find(scene, ROLE_OF_PARAMETERS)
     shell = ShellParameters() if node is None else read(node, ShellParameters)
     if not shell.caseJson:
-        raise InputError.of(
-            "no-case-in-scene",
-            "the scene holds no case",
-            next_step="open a case, or a scene that HexaFix saved",
-        )
+        raise no_case()
     case = case_from_document(
         shell.caseJson.encode(), folder=pathlib.Path(), needs_image=False, plannable=plannable
     )
-    untouched = _sha256(shell.caseJson) == shell.caseJsonSha256 and shell.caseFileSha256
+    untouched = is_as_stored(shell) and shell.caseFileSha256
     return dataclasses.replace(case, case_sha256=shell.caseFileSha256) if untouched else case
+
+
+def is_as_stored(shell: ShellParameters) -> bool:
+    """Whether nobody changed the case since it was stored."""
+    return _sha256(shell.caseJson) == shell.caseJsonSha256
+
+
+def no_case() -> InputError:
+    """The scene holds no case."""
+    return InputError.of(
+        "no-case-in-scene",
+        "the scene holds no case",
+        next_step="open a case, or a scene that HexaFix saved",
+    )
 
 
 def _sha256(text: str) -> str:

@@ -16,7 +16,7 @@ from hexafix.mrml import transforms as places
 from hexafix.mrml.logic import SceneLogic
 from hexafix.mrml.nodes import find
 from hexafix.pipeline import bone_fragments
-from hexafix.presenter import Step
+from hexafix.presenter import Step, StepState
 from hexafix.report.scene import BoneSample
 
 if TYPE_CHECKING:
@@ -227,16 +227,17 @@ class SceneSync:
         return True
 
     def _case(self, snapshot: Snapshot) -> bool:
-        # A document is a new object after every edit and the same one without.
-        step = str(snapshot.current.value)
-        if not self._new("case", (dict(snapshot.document), step)):
-            return False
+        document, sha256 = self.presenter.case_for_scene()
         shell = {
-            "step": step,
+            "step": str(snapshot.current.value),
             "splitFraction": float(self.presenter.split_fraction),
             "acceptRelaxedLayout": bool(snapshot.confirmed.get("relaxed_layout", False)),
+            "computedTo": _computed_to(snapshot),
         }
-        self.logic.save_case_into(snapshot.document, **shell)
+        volume = self._shown.get("volume")
+        if not self._new("case", (document, sha256 or "", shell, volume and volume[0])):
+            return False
+        self.logic.save_case_into(document, case_sha256=sha256, **shell)
         return True
 
     def _stale(self) -> None:
@@ -331,6 +332,16 @@ def _same(one: Any, other: Any) -> bool:
         return True
     plain = (str, int, float, bool, dict)
     return isinstance(one, plain) and isinstance(other, plain) and one == other
+
+
+def _computed_to(snapshot: Snapshot) -> str:
+    """The last of the steps that are done one after the other; empty: none."""
+    last = ""
+    for view in snapshot.steps:
+        if view.state != StepState.DONE:
+            break
+        last = str(view.step.value)
+    return last
 
 
 def _near(one: Any, other: Any) -> bool:

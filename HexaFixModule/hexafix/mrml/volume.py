@@ -8,22 +8,27 @@ whomever, what the reader said is no longer believed.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexafix.errors import Fault, ImageRefused
+from hexafix.errors import Fault, ImageRefused, InputError
 from hexafix.imaging.file_geometry import FileGeometry, corners_mm, faults_of_grid
 from hexafix.imaging.fingerprint import fingerprint
 from hexafix.imaging.volume import Acquisition, ImageSource, Volume
 from hexafix.mrml.geometry import FLIP, array4, vtk4
 from hexafix.mrml.nodes import NAME, PREFIX, ROLE, nodes_of, slicer_core
+from hexafix.strict_json import parse_json_object
 
 CONTENT = f"{PREFIX}content_sha256"
 AFFINE = f"{PREFIX}ijk_to_lps"
 SOURCE = f"{PREFIX}source"
+
+KINDS = ("dicom", "nrrd", "nifti", "metaimage", "memory")
+"""Where a CT can have come from."""
 
 SAME_PLACE_MM = 1e-6
 """A matrix rounded by a file's text moves no corner further than this."""
@@ -121,16 +126,61 @@ def volume_of(node: Any) -> Volume:
         faults = [_fault("values-not-finite", "the volume holds values that are no numbers", "H55")]
     if faults:
         raise ImageRefused(*faults)
-    stored = _stored_affine(node, affine, _size(voxels))
+    stored = _stored_affine(node.GetAttribute(AFFINE), affine, _size(voxels))
     # The matrix as it was read, not as the node's direction cosines and spacings rebuild it.
     affine = affine if stored is None else stored
     found = fingerprint(voxels, affine)
     untouched = stored is not None and node.GetAttribute(CONTENT) == found
-    source = _source(node) if untouched else None
+    source = _source(node.GetAttribute(SOURCE)) if untouched else None
     if source is None:
         known = node.GetAttribute(CONTENT) is not None
         source = ImageSource(sha256=found, warnings=(CHANGED if known else FOREIGN,))
     return Volume(voxels, affine, source)
+
+
+def volume_as_saved(read: Volume, attributes: Mapping[str, str]) -> Volume:
+    """The CT of a scene's file exactly as it was when HexaFix read it.
+
+    Parameters
+    ----------
+    read : Volume
+        What the scene's image file holds.
+    attributes : mapping of str
+        Those of the volume's node.
+
+    Raises
+    ------
+    ImageRefused
+        If voxels, place or what the reader knew are not as they were (H01), or HexaFix did not
+        read the CT (H07).
+    """
+    if CONTENT not in attributes:
+        raise ImageRefused(
+            _fault(
+                "scene-volume-foreign",
+                f"the scene cannot be opened with its CT: {FOREIGN}",
+                "H07",
+                next_step="load the CT from its own files",
+            )
+        )
+    affine = _stored_affine(attributes.get(AFFINE), read.ijk_to_lps, read.size_ijk)
+    source = _source(attributes.get(SOURCE))
+    found = None if affine is None else fingerprint(read.voxels, affine)
+    same = found is not None and attributes[CONTENT] == found
+    # Slices of a tilted gantry were hashed before they were moved.
+    named = source is not None and (source.acquisition is not None or source.sha256 == found)
+    if affine is None or source is None or not same or not named:
+        raise ImageRefused(
+            _fault(
+                "scene-volume-changed",
+                "the scene's CT is not the one that was saved: its values, its place or what is "
+                "known of it were changed",
+                "H01",
+                next_step="save the scene again where it was planned, or load the CT from its own "
+                "files",
+            )
+        )
+    return Volume(read.voxels, affine, source)
 
 
 def _source_document(source: ImageSource) -> dict[str, Any]:
@@ -140,20 +190,35 @@ def _source_document(source: ImageSource) -> dict[str, Any]:
     return document
 
 
-def _source(node: Any) -> ImageSource | None:
-    """What the reader knew; None where the attribute does not hold it."""
+def _source(text: str | None) -> ImageSource | None:
+    """What the reader knew; None where the attribute's text does not hold it, value by value."""
     try:
-        document = json.loads(node.GetAttribute(SOURCE) or "")
+        document = parse_json_object((text or "").encode(), what="source", where="volume node")
         acquired = document.pop("acquisition")
-        source = ImageSource(**{**document, "warnings": tuple(document["warnings"])})
+        warnings = document.pop("warnings")
+        source = ImageSource(**document, warnings=tuple(warnings))
+        _require_source(source, warnings)
         if acquired is None:
             return source
         i, j, k = (int(n) for n in acquired["size_ijk"])
         affine = np.array(acquired["ijk_to_lps"], float).reshape(4, 4)
         acquisition = Acquisition(affine, (i, j, k), float(acquired["tilt_deg"]))
+        if min(i, j, k) < 1 or not np.isfinite([*affine.ravel(), acquisition.tilt_deg]).all():
+            return None
         return replace(source, acquisition=acquisition)
-    except (ValueError, TypeError, KeyError):
+    except (InputError, ValueError, TypeError, KeyError):
         return None
+
+
+def _require_source(source: ImageSource, warnings: Any) -> None:
+    """ValueError unless every value is of its kind: a file may hold anything in their places."""
+    words = (source.laterality, source.body_part, source.patient_position)
+    thick = source.slice_thickness_mm
+    texts = [source.sha256, *warnings, *(word for word in words if word is not None)]
+    if not isinstance(warnings, list) or not all(isinstance(text, str) for text in texts):
+        raise ValueError
+    if source.kind not in KINDS or not (thick is None or isinstance(thick, (int, float))):
+        raise ValueError
 
 
 def _require_scalar(node: Any) -> None:
@@ -208,11 +273,11 @@ def _index_matrix(node: Any) -> NDArray[np.float64]:
 
 
 def _stored_affine(
-    node: Any, affine: NDArray[np.float64], size_ijk: tuple[int, int, int]
+    text: str | None, affine: NDArray[np.float64], size_ijk: tuple[int, int, int]
 ) -> NDArray[np.float64] | None:
-    """The affine as it was read, if the node's own puts every corner at the same place."""
+    """The affine as it was read, if `affine` puts every corner at the same place."""
     try:
-        stored = np.array(json.loads(node.GetAttribute(AFFINE) or ""), float).reshape(4, 4)
+        stored = np.array(json.loads(text or ""), float).reshape(4, 4)
     except (ValueError, TypeError):
         return None
     apart = np.abs(corners_mm(size_ijk, stored) - corners_mm(size_ijk, affine)).max()

@@ -34,6 +34,8 @@ LOOKS = {
 }
 """Ground, ink and sign of a message; both colours are set, so that any theme leaves it legible."""
 
+OPEN_FILES = "Cases and scenes (*.json *.mrb)"
+
 SAVE, DISCARD, KEEP = "Save", "Discard", "Go on editing"
 
 
@@ -60,8 +62,8 @@ def save(panel: Panel, *, elsewhere: bool = False) -> bool:
 
 
 def open_case(panel: Panel, _: Any = None) -> None:
-    """Ask for a case file and open it."""
-    path = panel.widgets.ask_file("Open a case", JSON_FILES)
+    """Ask for a case file or a scene and open it."""
+    path = panel.widgets.ask_file("Open a case or a scene", OPEN_FILES)
     if path and may_leave(panel):
         panel.open_case(Path(path))
 

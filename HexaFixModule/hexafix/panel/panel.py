@@ -273,7 +273,7 @@ class Panel:
         return True
 
     def open_case(self, path: Path) -> bool:
-        """Open a case file in place of the present case."""
+        """Open a case file or a scene in place of the present case."""
         self.blank()
         return self.presenter.open_case(path)
 

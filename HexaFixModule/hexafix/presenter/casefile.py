@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from hexafix.case.read import file_of_case
+from hexafix.case.read import file_of_case, resolve_fixator
 from hexafix.errors import InputError
 from hexafix.export import replace_file
 from hexafix.presenter.history import Version, document_bytes
@@ -28,17 +30,23 @@ def read_case_file(path: Path) -> tuple[Path, bytes, Version]:
     """
     file = file_of_case(path).resolve()
     raw, content = read_json_object(file, what="case file")
-    if not isinstance(content.get("schema_version"), int):
+    require_case(content)
+    content_bytes = raw
+    if content.get(TYPED_ONCE) is True:
+        content_bytes = document_bytes({k: v for k, v in content.items() if k != TYPED_ONCE})
+    return file, raw, Version(content_bytes, file.parent, label="open the case")
+
+
+def require_case(content: Mapping[str, Any]) -> None:
+    """InputError if a document is no case, complete or a draft."""
+    version = content.get("schema_version")
+    if not isinstance(version, int) or isinstance(version, bool):
         raise InputError.of(
             "not-a-case",
             "the file is not a case file",
             where="case file",
             next_step="open a case.json, or load an image into a new case",
         )
-    content_bytes = raw
-    if content.get(TYPED_ONCE) is True:
-        content_bytes = document_bytes({k: v for k, v in content.items() if k != TYPED_ONCE})
-    return file, raw, Version(content_bytes, file.parent, label="open the case")
 
 
 def file_bytes(version: Version, *, typed_once: bool) -> bytes:
@@ -46,6 +54,17 @@ def file_bytes(version: Version, *, typed_once: bool) -> bytes:
     if not typed_once:
         return version.raw
     return document_bytes({**version.copy(), "schema_version": 2, TYPED_ONCE: True})
+
+
+def portable(version: Version) -> dict[str, Any]:
+    """The document as it reads anywhere: with the definition of a fixator in place of its file."""
+    document = version.copy()
+    given, folder = document.get("fixator"), version.folder
+    if isinstance(given, str) and folder is not None and (folder / given).is_file():
+        _, definition, faults = resolve_fixator(document, set(), folder)
+        if not faults:
+            document["fixator"] = definition
+    return document
 
 
 def moved(version: Version, folder: Path) -> Version:

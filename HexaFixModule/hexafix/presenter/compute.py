@@ -60,6 +60,12 @@ def compute(
     return Result(step, inputs.key(step, image) or "", image, value, document, faults, kind)
 
 
+def loaded(inputs: Inputs, volume: Any, document: Mapping[str, Any]) -> Result:
+    """The result of `Step.LOAD` of a volume that was read already, with its image document."""
+    image = image_identity(document)
+    return Result(Step.LOAD, inputs.key(Step.LOAD, image) or "", image, volume, document)
+
+
 def search(
     engine: Engine, inputs: Inputs, volume: Any, *, image: str, progress: Progress = silent
 ) -> Result:

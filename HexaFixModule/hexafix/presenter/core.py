@@ -15,6 +15,7 @@ from hexafix.presenter.engine import Engine, pipeline_engine
 from hexafix.presenter.history import History, Version, document_bytes
 from hexafix.presenter.inputs import ORDER, Inputs, file_hash, stamp_of
 from hexafix.presenter.results import Result, Results
+from hexafix.presenter.scenes import ReadScene, with_scenes
 from hexafix.presenter.signal import Signal
 from hexafix.presenter.state import Banner, Kind, Snapshot, Step, Table
 from hexafix.presenter.worker import Job, Post
@@ -61,7 +62,12 @@ class Core:
     """What all parts of the presenter share; `lock` guards every attribute."""
 
     def __init__(
-        self, *, engine: Engine | None = None, post: Post | None = None, threaded: bool = True
+        self,
+        *,
+        engine: Engine | None = None,
+        post: Post | None = None,
+        threaded: bool = True,
+        read_scene: ReadScene | None = None,
     ) -> None:
         self.lock = threading.RLock()
         self.changed = Signal()
@@ -88,7 +94,8 @@ class Core:
         self.progress: tuple[str, float] | None = None
         self.closed = False
         self.tables: dict[Any, dict[str, Table]] = {}
-        self._engine = engine
+        self.read_scene = read_scene
+        self._engine = engine if engine is None else self._with_scenes(engine)
         self._threaded = threaded
         self._post = post
         self._split_fraction = 0.5
@@ -99,8 +106,11 @@ class Core:
     def engine(self) -> Engine:
         """The pipeline, or what stands for it."""
         if self._engine is None:
-            self._engine = pipeline_engine()
+            self._engine = self._with_scenes(pipeline_engine())
         return self._engine
+
+    def _with_scenes(self, engine: Engine) -> Engine:
+        return engine if self.read_scene is None else with_scenes(engine, self.read_scene)
 
     @property
     def snapshot(self) -> Snapshot:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from hexafix.strict_json import parse_json_object
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Bytes that stand for those of a case file that is not at hand.
+
+    Attributes
+    ----------
+    raw_sha256 : str
+        Hash of the bytes that stand for it.
+    told : str
+        Hash of the case file, as told by what they were read from.
+    """
+
+    raw_sha256: str
+    told: str
 
 
 @dataclass(frozen=True)
@@ -26,12 +43,22 @@ class Version:
         Whether the relaxed angle rule is accepted (H17); not part of the case file.
     label : str
         The edit that made this version.
+    origin : Origin or None
+        Of a case that came in a scene; it speaks of its own bytes alone, so that an edit cannot
+        carry the hash on.
     """
 
     raw: bytes
     folder: Path | None = None
     relaxed: bool = False
     label: str = ""
+    origin: Origin | None = None
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the case file that holds this version: what a plan names as its case."""
+        own = hashlib.sha256(self.raw).hexdigest()
+        return self.origin.told if self.origin and self.origin.raw_sha256 == own else own
 
     @cached_property
     def content(self) -> Mapping[str, Any]:

@@ -175,6 +175,7 @@ class Inputs:
         if step in (Step.SCHEDULE, Step.EXPORT):
             return {
                 "raw": hashlib.sha256(self.version.raw).hexdigest(),
+                "case": self.version.sha256,
                 "fixator": self.fixator_file,
                 "relaxed": self.version.relaxed,
             }
@@ -222,7 +223,8 @@ class Inputs:
     def case_for(self, step: Step) -> Case:
         """A case that holds what a step reads, and nothing else."""
         if step in (Step.SCHEDULE, Step.EXPORT):
-            return case_from_document(self.version.raw, folder=self.folder, needs_image=False)
+            case = case_from_document(self.version.raw, folder=self.folder, needs_image=False)
+            return replace(case, case_sha256=self.version.sha256)
         raw = json.dumps(self._case_document(step)).encode()
         return case_from_document(raw, folder=self.folder, needs_image=False, plannable=False)
 

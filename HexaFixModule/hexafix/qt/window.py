@@ -9,6 +9,8 @@ from hexafix.panel import Panel, QtWidgets
 from hexafix.panel.frame import may_leave, new_case, open_case, save
 from hexafix.paths import resources
 from hexafix.presenter import Presenter, Snapshot
+from hexafix.presenter.scenes import SceneContent
+from hexafix.progress import Progress, silent
 from hexafix.qt.kit import kit, made, views
 from hexafix.qt.stage import WINDOWS, Stage
 
@@ -19,6 +21,14 @@ PANEL_WIDTH = 530
 
 SETTINGS = ("HexaFix", "hexafix")
 RECENT = "recentCase"
+
+
+def read_scene(path: Path, *, progress: Progress = silent) -> SceneContent:
+    """Case and CT of a scene's file; see `hexafix.mrml.scene_file.read_scene`."""
+    # Not at the top: a start without a scene need not wait for it.
+    from hexafix.mrml.scene_file import read_scene as read
+
+    return read(path, progress=progress)
 
 
 def panel_widget() -> Any:
@@ -42,7 +52,7 @@ class Window:
         q = kit()
         views()
         self.poster = made().Poster()
-        self.presenter = presenter or Presenter(post=self.poster.post)
+        self.presenter = presenter or Presenter(post=self.poster.post, read_scene=read_scene)
         self.settings = settings if settings is not None else q.QSettings(*SETTINGS)
         self.main = q.QMainWindow()
         self.main.setObjectName("hexafixWindow")

@@ -73,6 +73,7 @@ class SlicerPanel:
     def _open(self) -> None:
         # Not at the top: these need what may have to be installed first.
         from hexafix.mrml.logic import SceneLogic
+        from hexafix.mrml.scene_file import read_scene
         from hexafix.panel import Panel
         from hexafix.presenter import Presenter
         from hexafix.slicer_panel.clicks import SliceClicks
@@ -80,7 +81,7 @@ class SlicerPanel:
 
         self._widgets = load_panel(self._parent)
         self._ui = UiThread(host.qt().QTimer(self._widgets.root))
-        self.presenter = Presenter(post=self._ui.post)
+        self.presenter = Presenter(post=self._ui.post, read_scene=read_scene)
         self.logic = SceneLogic(self._scene, app_logic=self._app_logic)
         self._join_scene()
         self.panel = Panel(self._widgets, self.presenter)
@@ -112,6 +113,7 @@ class SlicerPanel:
         The CT has to be chosen again: a scene does not say where it came from (H51).
         """
         from hexafix.mrml.parameter_node import IN_THE_SCENE
+        from hexafix.presenter.casefile import TYPED_ONCE
 
         snapshot = self.presenter.snapshot
         if snapshot.case_path is not None or snapshot.edited or snapshot.can_undo:
@@ -121,6 +123,8 @@ class SlicerPanel:
             return
         if document.get("image", {}).get("path") == IN_THE_SCENE:
             del document["image"]
+        # Of readings that were typed once: here they are asked for again in any case (H24).
+        document.pop(TYPED_ONCE, None)
         self.presenter.edit("take over the case of the scene", lambda _: document)
 
     def enter(self) -> None:

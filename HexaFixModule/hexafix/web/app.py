@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.web.files import read_scene
 from hexafix.web.views import Views
 
 if TYPE_CHECKING:
@@ -23,11 +24,12 @@ def started_presenter(case: Path | None) -> Presenter:
     Parameters
     ----------
     case : Path or None
-        Case file to open; its CT is read at once, while the page is still being built.
+        Case file, or scene, to open; its CT is read at once, while the page is still being built.
     """
     from hexafix.presenter import Presenter, Step
 
-    presenter = Presenter(post=asyncio.get_running_loop().call_soon_threadsafe)
+    post = asyncio.get_running_loop().call_soon_threadsafe
+    presenter = Presenter(post=post, read_scene=read_scene)
     if case is not None and presenter.open_case(case):
         presenter.run(Step.LOAD)
     return presenter

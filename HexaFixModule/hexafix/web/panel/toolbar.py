@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hexafix.web.files import CASE_SUFFIXES
+from hexafix.web.files import CASE_SUFFIXES, SCENE_SUFFIXES
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext, typed_state
 from hexafix.web.panel.scene import SceneFile
@@ -47,7 +47,9 @@ class Toolbar:
                 html.Span("not saved", v_if=name.edited, classes="hxp-unsaved", **marked("unsaved"))
         with html.Div(classes="hxp-row", role="group"):
             icon_button("mdi-file-plus-outline", "New case", "new-case", self.new_case)
-            icon_button("mdi-folder-open-outline", "Open a case", "open-case", self.open_case)
+            icon_button(
+                "mdi-folder-open-outline", "Open a case or a scene", "open-case", self.open_case
+            )
             save = f"{name.case_path} ? 'Save the case' : 'Save the case as a file'"
             icon_button("mdi-content-save-outline", (save,), "save-case", self.save)
             icon_button(
@@ -142,15 +144,15 @@ class Toolbar:
 
     def _choose_case(self) -> None:
         self._chooser.ask(
-            "Open a case",
+            "Open a case or a scene",
             "Open",
             self._open,
-            suffixes=CASE_SUFFIXES,
-            hint="A case file (case.json).",
+            suffixes=(*CASE_SUFFIXES, *SCENE_SUFFIXES),
+            hint="A case file (case.json), or a scene (.mrb) that HexaFix saved, with its CT.",
         )
 
     def _open(self, path: Path) -> None:
-        """Open a case file, and read its image if it names one."""
+        """Open a case file, and read its image if it names one; or a scene with both."""
         from hexafix.presenter import Step, StepState
 
         context = self._context
