@@ -266,5 +266,35 @@ def test_a_target_pose_typed_in_the_page_is_the_presenters_case(
     assert given == a_case_by_presenter(TARGET)
 
 
+CUT = """() => [...document.querySelectorAll(
+    '.v-select__selection-text, .v-field-label--floating, .v-btn__content, .hxp-notice, .hxp-when')]
+  .filter(e => e.offsetParent && e.clientWidth && e.scrollWidth > e.clientWidth + 1)
+  .map(e => e.innerText)"""
+"""Words of fields and buttons for which there is no room."""
+
+STEPS = ("load", "markers", "numbering", "poses", "readings", "correction", "schedule", "export")
+
+
+def test_on_a_small_screen_nothing_is_cut_and_the_opened_step_is_in_view(a_planned_desk):
+    desk, page = a_planned_desk, a_planned_desk.page
+    page.set_viewport_size({"width": 1280, "height": 800})
+    bar = desk.at("views-bar").bounding_box()
+    assert bar["height"] < 60.0  # one line
+    for step in (*STEPS, "numbering", "load"):
+        desk.open(step)
+        expect(desk.at(f"open-{step}")).to_be_in_viewport(ratio=1.0)
+        assert page.evaluate(CUT) == [], step
+
+
+def test_where_no_ct_is_loaded_no_view_tells_a_place(a_planned_desk):
+    desk = a_planned_desk
+    assert desk.at("Red-position").is_visible()
+    desk.click("new-case")
+    desk.page.get_by_text("No CT is loaded").wait_for(timeout=LONG_MS)
+    for view in ("Red", "Green", "Yellow"):
+        for what in ("position", "left", "top"):
+            desk.at(f"{view}-{what}").wait_for(state="hidden")
+
+
 def test_the_console_is_clean_after_all_this(a_planned_desk):
     assert a_planned_desk.page.said == []

@@ -47,8 +47,9 @@ html { overflow: hidden; }
 .hxv-bottom { bottom: 34px; left: 50%; transform: translateX(-50%); }
 .hxv-slider { position: absolute; bottom: 0; left: 8px; right: 8px; }
 .hxv-reset { position: absolute; top: 2px; right: 2px; }
-.hxv-note { position: absolute; top: 50%; left: 0; right: 0; text-align: center; color: #bdbdbd;
-  pointer-events: none; font-size: 16px; }
+.hxv-note { position: absolute; top: 50%; left: 50%; transform: translate(-50%, -50%);
+  padding: 6px 14px; border-radius: 4px; background: #000; color: #e0e0e0; pointer-events: none;
+  font-size: 16px; }
 """
 """Style of what lies over the views; white on a dark rim is legible on bone and on air."""
 
@@ -88,12 +89,14 @@ def over_slice(server: Any, view_id: str, view: Any) -> None:
     name_over(view)
     html.Div(
         f"{{{{ {state_name(view_id, 'position')} }}}}",
+        v_if="views_loaded",
         classes="hxv-over hxv-position",
         raw_attrs=[f'data-testid="{view_id}-position"'],
     )
     for edge in EDGES:
         html.Div(
             f"{{{{ {state_name(view_id, edge)} }}}}",
+            v_if="views_loaded",
             classes=f"hxv-over hxv-edge hxv-{edge}",
             raw_attrs=[f'data-testid="{view_id}-{edge}"'],
         )

@@ -44,7 +44,7 @@ class LayoutEditor:
         with html.Details(classes="hxp-details", **marked("layout-editor")):
             html.Summary("Marker layout of both rings", **marked("layout-summary"))
             for ring in ("proximal", "distal"):
-                html.Div(f"{ring} ring", classes="hxp-title")
+                html.Div(f"{ring.capitalize()} ring", classes="hxp-title")
                 self._ring(ring, getattr(self._name, ring))
 
     def _ring(self, ring: str, rows: str) -> None:

@@ -1,4 +1,5 @@
-/* Ctrl+Z, Ctrl+Shift+Z and Escape for the whole page; the server decides what they do. */
+/* Ctrl+Z, Ctrl+Shift+Z and Escape for the whole page, on which the server decides; and the step
+   that was opened is brought into view, since the one above it has closed. */
 (() => {
   const typing =
     'input:not([readonly]):not([type=checkbox]):not([type=radio]):not([type=range]), textarea';
@@ -12,5 +13,19 @@
     if (!undo || event.key.toLowerCase() !== "z" || event.target.closest?.(typing)) return;
     event.preventDefault();
     ask(event.shiftKey ? "hx_redo" : "hx_undo");
+  });
+  let shown = null;
+  const follow = () => {
+    const open = document.querySelector(".hxp-open");
+    if (!open || open === shown) return;
+    const first = shown === null;
+    shown = open;
+    if (first) return;
+    open.scrollIntoView({ block: "nearest" });
+    open.querySelector(".hxp-head").scrollIntoView({ block: "nearest" });
+  };
+  new MutationObserver(follow).observe(document, {
+    subtree: true,
+    attributeFilter: ["class"],
   });
 })();
