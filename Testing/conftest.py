@@ -46,6 +46,87 @@ def a_case_on_disk(a_phantom, tmp_path_factory):
     return folder / "case.json"
 
 
+MARKER = {"radius_mm": 100.0, "height_mm": 20.0}
+WHOLE = {
+    "schema_version": 2,
+    "case_id": "left-tibia-01",
+    "limb": {"side": "left", "bone": "tibia"},
+    "image": {"path": "ct", "series_instance_uid": None},
+    "fixator": "generic-6sps-160",
+    "markers": {
+        "ball_diameter_mm": 10.0,
+        "proximal": [{"number": k, "sweep_deg": 105.0 * k, **MARKER} for k in (1, 2, 3)],
+        "distal": [{"number": k, "sweep_deg": 105.0 * k, **MARKER} for k in (4, 5, 6)],
+    },
+    "strut_readings_mm": [180.0, 175, 167.0, 168.0, 157.0, 181.5],
+    "schedule": {
+        "start_date": "2026-12-01",
+        "adjustments_per_day": 4,
+        "strut_step_mm": 0.5,
+        "structures_at_risk_lps_mm": [[1.0, 2.0, 3.0]],
+    },
+}
+POINTS = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 50.0, 0.0]]
+CORRECTIONS = (
+    {"kind": "target-pose", "position_mm": [0, 0, 160.0], "angles_deg": [0, 0, 0]},
+    {
+        "kind": "fragment-motion",
+        "moving": "distal",
+        "matrix_lps": [[float(i == j) for j in range(4)] for i in range(4)],
+    },
+    {
+        "kind": "landmarks",
+        "moving": "distal",
+        "moving_points_lps_mm": POINTS,
+        "fixed_points_lps_mm": POINTS,
+    },
+    {
+        "kind": "deformity",
+        "moving": "distal",
+        "origin_lps_mm": [1.0, 2.0, 3.0],
+        "ap_angulation_deg": 5.0,
+        "ap_angulation": "varus",
+        "axial_rotation": None,
+    },
+)
+
+
+@pytest.fixture(scope="session")
+def whole_documents():
+    """Right case documents that hold all that doors show, one for each kind of correction."""
+    return tuple({**copy.deepcopy(WHOLE), "correction": kind} for kind in CORRECTIONS)
+
+
+@pytest.fixture(scope="session")
+def odd_documents(whole_documents):
+    """The same with one value of another kind, too many of it, or none."""
+
+    def places(value, place=()):
+        if place:
+            yield place
+        inside = value.items() if isinstance(value, dict) else enumerate(value[:1])
+        for key, held in inside:
+            yield from (
+                places(held, (*place, key)) if isinstance(held, dict | list) else [(*place, key)]
+            )
+
+    made = []
+    for first, document in enumerate(whole_documents):
+        for place in places(document):
+            if first and place[0] != "correction":
+                continue
+            for odd in (None, "x", 7, True, [], {}, [None], [[1.0, 2.0]], [{}], ...):
+                changed = copy.deepcopy(document)
+                inner = changed
+                for key in place[:-1]:
+                    inner = inner[key]
+                inner[place[-1]] = odd
+                if odd is ...:
+                    del inner[place[-1]]
+                made.append(changed)
+    return made
+
+
 @pytest.fixture(scope="session")
 def a_recognised(a_phantom):
     """What the chain recognises in the phantom."""

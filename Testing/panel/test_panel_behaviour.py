@@ -367,3 +367,28 @@ def test_a_mistake_is_told_without_keys_of_the_case_file(panel, widgets):
     words = "it is wrong (value 1, limit 2), at: smallest strut step"
     assert panel.notices[0].message == words
     assert widgets.values["strutStepLineEdit", "mark"] == f"{words}. Next step: mend"
+
+
+def test_a_case_with_odd_values_is_shown_without_them(panel, presenter, odd_documents):
+    for document in odd_documents:
+        assert presenter.edit("odd", lambda _, document=document: document)
+    assert panel.snapshot.can_undo
+
+
+def test_no_numbers_of_another_motion_stand_beside_one_that_none_can_tell(
+    panel, widgets, presenter, monkeypatch
+):
+    from hexafix.panel import correction
+
+    monkeypatch.setattr(correction, "center", lambda panel: [1.0, 2.0, 3.0])
+    value = presenter.value
+    monkeypatch.setattr(
+        presenter, "value", lambda step: object() if step == Step.POSES else value(step)
+    )
+    shift = [[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    turn = [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    given = {"kind": "fragment-motion", "moving": "distal"}
+    presenter.set_correction({**given, "matrix_lps": shift})
+    assert widgets.get("motionXLineEdit", "text") == "5"
+    presenter.set_correction({**given, "matrix_lps": turn})
+    assert {widgets.get(name, "text") for name in correction.MOTION} == {""}

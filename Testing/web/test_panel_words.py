@@ -192,6 +192,32 @@ def test_a_fragment_motion_by_numbers_moves_the_centre_by_the_shift_alone():
     assert [float(text) for text in again["translation"]] == pytest.approx([1.5, -2, 3], abs=1e-3)
 
 
+QUARTER_TURN = [[0.0, 0, 1.0, 0], [0, 1.0, 0, 0], [-1.0, 0, 0, 0], [0, 0, 0, 1.0]]
+
+
+@pytest.mark.parametrize("center", [["1", "2", "3"], ["1", "2", "here"]])
+def test_a_motion_that_no_numbers_tell_leaves_its_fields_empty(center):
+    draft = drafts.empty() | {"translation": ["9", "9", "9"], "center": center}
+    motion = {"kind": "fragment-motion", "moving": "distal", "matrix_lps": QUARTER_TURN}
+    shown = drafts.of_document(motion, draft)
+    assert {*shown["translation"], *shown["angles"]} == {""}
+    with pytest.raises(InputError):
+        drafts.to_document(shown)
+
+
+def test_a_case_with_odd_values_is_shown_without_them(odd_documents):
+    from hexafix.presenter import Presenter
+    from hexafix.web.panel import Panel
+    from trame.app import get_server
+
+    presenter = Presenter(threaded=False)
+    panel = Panel(get_server("odd-cases", client_type="vue3"), presenter, NoViews())
+    for document in odd_documents:
+        presenter.edit("odd", lambda _, document=document: document)
+        panel.update(presenter.snapshot)
+    presenter.close()
+
+
 def test_a_field_that_is_no_number_names_itself():
     draft = drafts.empty() | {"kind": "target-pose", "position": ["0", "1,5", "178"]}
     with pytest.raises(InputError) as refused:

@@ -205,7 +205,8 @@ def _motion_texts(panel: Panel, held: Mapping[str, Any]) -> list[str | None]:
     try:
         found = motion_numbers(held["matrix_lps"], center_lps_mm=center(panel))
     except InputError:
-        return [None] * 6
+        panel.motion_numbers = None
+        return [""] * 6  # numbers that stood there before would seem to be this motion's
     panel.motion_numbers = [*found["translation_mm"], *found["angles_deg"]]
     return [rounded(value, 4) for value in panel.motion_numbers]
 

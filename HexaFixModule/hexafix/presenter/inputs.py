@@ -19,6 +19,7 @@ from hexafix.case import (
 )
 from hexafix.errors import Fault
 from hexafix.presenter.history import Version
+from hexafix.presenter.shape import shaped
 from hexafix.presenter.state import Step
 
 ORDER = tuple(Step)
@@ -114,8 +115,8 @@ class Inputs:
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        """A copy of the case document for doors to look at."""
-        return self.version.copy()
+        """A copy of the case document for doors to look at: every part of its kind."""
+        return shaped(self.version.copy())
 
     @cached_property
     def parts(self) -> CaseParts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hexafix.errors import InputError
 from hexafix.web.panel.context import number
 from hexafix.web.state import number_words
 
@@ -72,14 +73,20 @@ def of_document(correction: Mapping[str, Any], draft: Mapping[str, Any]) -> dict
 
 
 def motion_words(matrix: Any, center: Sequence[str]) -> dict[str, Any]:
-    """A fragment's motion in numbers about the draft's centre; nothing without a centre."""
+    """A fragment's motion in numbers about the draft's centre; nothing without a centre.
+
+    Where no numbers can tell it, their fields are empty: others would seem to be the case's.
+    """
     from hexafix.pipeline import motion_numbers
     from hexafix.pipeline.text import format_number
 
     if not all(center):
         return {}
-    about = [number(text, where="correction.center") for text in center]
-    found = motion_numbers(matrix, center_lps_mm=about)
+    try:
+        about = [number(text, where="correction.center") for text in center]
+        found = motion_numbers(matrix, center_lps_mm=about)
+    except InputError:
+        return {"translation": ["", "", ""], "angles": ["", "", ""]}
     return {
         "translation": [format_number(value, 3) for value in found["translation_mm"]],
         "angles": [format_number(value, 3) for value in found["angles_deg"]],

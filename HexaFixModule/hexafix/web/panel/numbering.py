@@ -176,6 +176,7 @@ class NumberingStep:
                         "residual": residuals.get(str(site["number"]), ""),
                     }
                     for site in markers.get(ring) or ()
+                    if site["number"] is not None
                 ],
             }
             for ring in RINGS
