@@ -80,6 +80,21 @@ def test_the_page_shows_the_ct_in_all_views_and_asks_nobody_else(a_server, a_pag
     assert a_page.said == []
 
 
+def test_every_page_is_told_of_the_others(a_server, a_page):
+    _, url = a_server
+    line = '[data-testid="open-pages"]'
+    a_page.goto(url)
+    a_page.wait_for_selector('[data-testid="banners"]', state="attached", timeout=60000)
+    assert a_page.locator(line).count() == 0
+    other = a_page.context.new_page()
+    other.goto(url)
+    for page in (a_page, other):
+        page.wait_for_selector(f'{line}[data-count="2"]', timeout=60000)
+        assert page.locator(line).inner_text().startswith("2 pages show this one case")
+    other.close()
+    a_page.wait_for_selector(line, state="detached", timeout=60000)
+
+
 def test_scrolling_in_the_browser_moves_the_slice(a_server, a_page):
     _, url = a_server
     a_page.goto(url)

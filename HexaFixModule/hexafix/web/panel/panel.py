@@ -16,6 +16,7 @@ from hexafix.web.panel.export import ExportStep
 from hexafix.web.panel.load import LoadStep
 from hexafix.web.panel.markers import MarkersStep
 from hexafix.web.panel.numbering import NumberingStep
+from hexafix.web.panel.pages import OpenPages
 from hexafix.web.panel.playback import Playback
 from hexafix.web.panel.poses import PosesStep
 from hexafix.web.panel.prescription import PrescriptionPages, data_address
@@ -57,6 +58,7 @@ class Panel:
         self._chooser = Chooser(context)
         self._scene = SceneFile(context, self._chooser)
         self._bar = Toolbar(context, self._chooser, self._scene)
+        self._open_pages = OpenPages(context)
         self._banners = Banners(context)
         self._load = LoadStep(context, self._chooser)
         self._markers = MarkersStep(context)
@@ -89,6 +91,7 @@ class Panel:
 
     def drawer(self) -> None:
         """Make banners and steps."""
+        self._open_pages.build()
         self._scene.build_line()
         self._banners.build()
         self._stepper.build()
