@@ -1,7 +1,6 @@
 """Arrows go only down the ladder of rooms, and a plain import stays small."""
 
 import ast
-import subprocess
 import sys
 from pathlib import Path
 
@@ -174,34 +173,22 @@ def test_every_room_stands_on_the_ladder():
     assert {room(path) for path in files()} <= set(LADDER)
 
 
-def modules_after(code):
-    listing = f"{code}\nimport sys\nprint(*sorted({{m.split('.')[0] for m in sys.modules}}))"
-    run = subprocess.run(
-        [sys.executable, "-c", listing],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={"PYTHONPATH": str(PACKAGE.parent), "PATH": ""},
-    )
-    return set(run.stdout.split())
-
-
-def test_a_plain_import_pulls_in_nothing_heavy():
+def test_a_plain_import_pulls_in_nothing_heavy(modules_after):
     loaded = modules_after("import hexafix")
     assert not loaded & {"numpy", "scipy", "pydantic", "SimpleITK", "pydicom", "vtk", "typst"}
 
 
-def test_the_command_line_starts_without_the_chain():
+def test_the_command_line_starts_without_the_chain(modules_after):
     loaded = modules_after("import hexafix.cli")
     assert not loaded & {"numpy", "scipy", "pydantic", "SimpleITK", "pydicom", "vtk", "typst"}
 
 
-def test_the_chain_imports_no_toolkit():
+def test_the_chain_imports_no_toolkit(modules_after):
     loaded = modules_after("import hexafix.pipeline, hexafix.verify")
     assert not loaded & (SIDEWAYS_OR_DOORS - {"matplotlib"})
 
 
-def test_the_slicer_entrance_imports_without_slicer_and_does_no_arithmetic():
+def test_the_slicer_entrance_imports_without_slicer_and_does_no_arithmetic(modules_after):
     entrance = PACKAGE.parent / "HexaFixModule.py"
     names = {name.split(".")[0] for name in imports(entrance)}
     assert names <= {"hexafix", "slicer", "sys", "pathlib", "typing", "tempfile", "__future__"}
