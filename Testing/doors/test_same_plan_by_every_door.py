@@ -4,7 +4,6 @@ The Qt window and the browser are compared with it where their windows are drive
 `qt/test_desktop_window.py` and `web/test_chromium_workflow.py`.
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -27,9 +26,12 @@ def a_dicom_case(a_phantom, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def by_the_command_line(a_dicom_case, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("command") / "prescription"
+    return planned_by_command(a_dicom_case, tmp_path_factory.mktemp("command") / "prescription")
+
+
+def planned_by_command(case, folder):
     subprocess.run(
-        [sys.executable, "-m", "hexafix", "plan", a_dicom_case, "--out", folder],
+        [sys.executable, "-m", "hexafix", "plan", case, "--out", folder],
         check=True,
         capture_output=True,
         env={**os.environ, "PYTHONPATH": str(PACKAGE), "OPENBLAS_NUM_THREADS": "1"},
@@ -46,12 +48,34 @@ def by_the_presenter(case, folder):
 
     presenter = Presenter()
     assert presenter.open_case(case)
+    export_by(presenter, folder)
+    presenter.close()
+
+
+def export_by(presenter, folder):
     presenter.run_all()
     presenter.wait(120)
-    presenter.confirm_side(json.loads(case.read_text())["limb"]["side"])
+    presenter.confirm_side(presenter.snapshot.document["limb"]["side"])
     presenter.export(folder)
     presenter.wait(60)
+
+
+def scene_of(case, path):
+    """A scene with the case and its CT, saved before anything was computed."""
+    from hexafix.mrml import HeadlessMrmlApp, SceneLogic, SceneSync
+    from hexafix.presenter import Presenter, Step
+
+    presenter = Presenter()
+    assert presenter.open_case(case)
+    presenter.run(Step.LOAD)
+    presenter.wait(60)
+    with HeadlessMrmlApp() as app:
+        sync = SceneSync(SceneLogic(app.scene), presenter)
+        sync.update(presenter.snapshot)
+        sync.save_bundle(path)
+        sync.close()
     presenter.close()
+    return path
 
 
 def by_the_module_logic(case, folder):
@@ -74,3 +98,24 @@ def test_a_door_writes_the_files_of_the_command_line(
     written = files_of(tmp_path / "prescription")
     assert written.keys() == by_the_command_line.keys()
     assert written == by_the_command_line
+
+
+def test_a_scene_and_a_case_saved_from_it_give_the_files_of_the_command_line(
+    a_dicom_case, by_the_command_line, tmp_path
+):
+    from hexafix.mrml.scene_file import read_scene
+    from hexafix.presenter import Presenter
+
+    (tmp_path / "scenes").mkdir()
+    presenter = Presenter(read_scene=read_scene)
+    assert presenter.open_case(scene_of(a_dicom_case, tmp_path / "scenes" / "tibia.mrb"))
+    assert presenter.wait(60)
+    export_by(presenter, tmp_path / "one")
+    assert files_of(tmp_path / "one") == by_the_command_line
+    # the case file is another one: its CT is the scene's
+    assert presenter.save_case(tmp_path / "case.json")
+    export_by(presenter, tmp_path / "two")
+    presenter.close()
+    written = files_of(tmp_path / "two")
+    assert written["plan.json"] != by_the_command_line["plan.json"]
+    assert planned_by_command(tmp_path / "case.json", tmp_path / "three") == written

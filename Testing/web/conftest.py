@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -134,25 +135,38 @@ class Desk:
         return self.at(f"number-{number}").get_attribute("data-ball")
 
 
-@pytest.fixture(scope="module")
-def a_desk(start_serving, a_case_on_disk, a_chromium, tmp_path_factory):
-    """A workstation of its own with the phantom's case open, in a page of 1440 × 900."""
-    folder = tmp_path_factory.mktemp("desk") / "phantom"
-    shutil.copytree(a_case_on_disk.parent, folder)
-    process, url = start_serving(folder / "case.json")
-    context = a_chromium.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
+@contextmanager
+def desk_of(start_serving, chromium, case=None):
+    """A workstation of its own in a page of 1440 × 900."""
+    process, url = start_serving(*([case] if case else []))
+    context = chromium.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
     page = context.new_page()
     page.said, page.asked = [], []
     page.on("console", lambda m: page.said.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: page.said.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))
     page.goto(url)
-    desk = Desk(page, folder / "case.json")
-    desk.wait("load", "done")
-    yield desk
+    yield Desk(page, case)
     context.close()
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def a_desk(start_serving, a_case_on_disk, a_chromium, tmp_path_factory):
+    """With the phantom's case open."""
+    folder = tmp_path_factory.mktemp("desk") / "phantom"
+    shutil.copytree(a_case_on_disk.parent, folder)
+    with desk_of(start_serving, a_chromium, folder / "case.json") as desk:
+        desk.wait("load", "done")
+        yield desk
+
+
+@pytest.fixture
+def a_new_desk(start_serving, a_chromium):
+    """`a_new_desk(case=None)`: another server and page, ended with the test."""
+    with ExitStack() as opened:
+        yield lambda case=None: opened.enter_context(desk_of(start_serving, a_chromium, case))
 
 
 @pytest.fixture(scope="module")

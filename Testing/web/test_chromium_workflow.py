@@ -162,6 +162,43 @@ def test_a_saved_scene_opens_as_it_was_planned_and_is_replaced_only_when_asked(
     a_planned_desk.click("close-scene-line")
 
 
+def test_a_saved_scene_is_opened_by_another_server_and_gives_the_same_files(
+    a_planned_desk, an_export_by_command, a_new_desk, tmp_path
+):
+    save_scene(a_planned_desk, tmp_path / "tibia")
+    a_planned_desk.at("scene-saved").wait_for(timeout=LONG_MS)
+    a_planned_desk.click("close-scene-line")
+    desk = a_new_desk()
+    open_file(desk, tmp_path / "tibia.mrb")
+    # planned before it was saved, so planned again
+    desk.wait("export", "done")
+    desk.at("playback").wait_for()
+    assert desk.at("unsaved").count() == 0
+    desk.open("load")
+    assert desk.at("case-id").locator("input").input_value() == case_id(a_planned_desk)
+    desk.open("export")
+    assert "side" in desk.at("export-blocked").inner_text()
+    desk.click("confirm-left")
+    for name in FILES:
+        with desk.page.expect_download() as download:
+            desk.click(f"download-{name}")
+        written = download.value.path().read_bytes()
+        assert written == (an_export_by_command / name).read_bytes(), name
+    damaged = tmp_path / "damaged.mrb"
+    damaged.write_bytes((tmp_path / "tibia.mrb").read_bytes()[:-1000])
+    open_file(desk, damaged)
+    desk.at("banner").filter(has_text="damaged").wait_for(timeout=LONG_MS)
+    assert desk.at("step-export").get_attribute("data-state") == "done"
+    assert desk.at("files").count() == 1
+    assert desk.page.said == []
+
+
+def open_file(desk, path):
+    desk.click("open-case")
+    desk.at("chooser-path").locator("input").fill(str(path))
+    desk.click("chooser-accept")
+
+
 def test_an_edit_greys_the_results_and_blocks_the_export_until_undone(a_planned_desk):
     a_planned_desk.open("schedule")
     a_planned_desk.write("schedule-max_rate_mm_per_day", "0.5")

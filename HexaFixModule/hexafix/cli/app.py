@@ -210,12 +210,14 @@ def recognise(
 ) -> int:
     """Recognise the poses of both rings and of the mechanism."""
     from hexafix.case import load_case
+    from hexafix.cli.scene_image import scene_volume
     from hexafix.cli.show import recognition_text
     from hexafix.pipeline import recognise_case
 
     loaded = load_case(case, plannable=False)
     with progress_bar(quiet=quiet) as progress:
-        document = recognise_case(loaded, progress=progress)
+        volume = scene_volume(loaded, progress=progress)
+        document = recognise_case(loaded, volume=volume, progress=progress)
     print_json(document) if json else print(recognition_text(document))
     return 0
 
@@ -270,13 +272,16 @@ def plan(
     # the picture's process loads its libraries while this one loads the chain
     with SceneRenderer() as renderer, progress_bar(quiet=quiet) as progress:
         from hexafix.case import load_case
+        from hexafix.cli.scene_image import scene_volume
         from hexafix.cli.show import plan_text
         from hexafix.export import FILES, MANIFEST
         from hexafix.pipeline import plan_and_export
 
+        loaded = load_case(case)
         document = plan_and_export(
-            load_case(case),
+            loaded,
             out,
+            volume=scene_volume(loaded, progress=progress),
             accept_relaxed_layout=accept_relaxed_layout,
             identified_pdf=identified_pdf,
             renderer=renderer,

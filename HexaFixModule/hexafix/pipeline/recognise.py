@@ -114,15 +114,26 @@ def recognise(
     )
 
 
-def recognise_case(case: Case, *, progress: Progress = silent) -> dict[str, Any]:
+def recognise_case(
+    case: Case, *, volume: Volume | None = None, progress: Progress = silent
+) -> dict[str, Any]:
     """Read the case's image, recognise and decide the gates; the document of `recognise`.
+
+    Parameters
+    ----------
+    case : Case
+    volume : Volume, optional
+        The CT, where a program holds it already; else it is read from the case's path.
+    progress : Progress, optional
 
     Raises
     ------
     Refused
         If a gate is red.
     """
-    recognised = recognise(case, read_case_image(case, progress=progress), progress=progress)
+    if volume is None:
+        volume = read_case_image(case, progress=progress)
+    recognised = recognise(case, volume, progress=progress)
     gates.decide(recognised.gates)
     return document.recognition(case, recognised)
 

@@ -149,6 +149,18 @@ def no_scenes() -> InputError:
     )
 
 
+def volume_of(content: SceneContent) -> Any:
+    """The CT of a scene; InputError if it holds none."""
+    if content.volume is None:
+        raise InputError.of(
+            "no-volume-in-scene",
+            "the scene holds no CT",
+            where="image.path",
+            next_step="choose the CT",
+        )
+    return content.volume
+
+
 CHANGED_MEANWHILE = Fault(
     "scene-changed-meanwhile",
     "the scene was not opened: the open case was edited, or the file changed, while it was read",
@@ -191,17 +203,7 @@ class EngineWithScenes:
             return self._engine.read_image(
                 path, series_instance_uid=series_instance_uid, progress=progress
             )
-        volume = self._read_scene(path, progress=progress).volume
-        if volume is None:
-            raise InputError(
-                Fault(
-                    "no-volume-in-scene",
-                    "the scene holds no CT",
-                    where="image.path",
-                    next_step="choose the CT",
-                )
-            )
-        return volume
+        return volume_of(self._read_scene(path, progress=progress))
 
 
 def with_scenes(engine: Engine, read_scene: ReadScene) -> Engine:
