@@ -14,15 +14,21 @@
     event.preventDefault();
     ask(event.shiftKey ? "hx_redo" : "hx_undo");
   });
+  const settled = 300; // ms until what was opened or closed has its size
   let shown = null;
+  const bring = () => {
+    if (!shown.isConnected) return;
+    shown.scrollIntoView({ block: "nearest" });
+    shown.querySelector(".hxp-head").scrollIntoView({ block: "nearest" });
+  };
   const follow = () => {
     const open = document.querySelector(".hxp-open");
     if (!open || open === shown) return;
     const first = shown === null;
     shown = open;
     if (first) return;
-    open.scrollIntoView({ block: "nearest" });
-    open.querySelector(".hxp-head").scrollIntoView({ block: "nearest" });
+    bring();
+    setTimeout(bring, settled);
   };
   new MutationObserver(follow).observe(document, {
     subtree: true,
