@@ -325,6 +325,18 @@ def test_a_scene_that_names_its_ct_twice_or_not_is_refused(lab, tag, pattern, ne
     assert lab.refused(lab.node(tag, pattern, new)) == {"bundle-damaged"}
 
 
+@pytest.mark.parametrize(
+    "element",
+    [
+        '<Volume id="a" name="b"></Volume>',
+        '<VolumeArchetypeStorage id="a" fileName="Data/volume.nrrd"/>',
+        '<ScriptedModule singletonTag="HexaFixModule" ModuleName="HexaFixModule"/>',
+    ],
+)
+def test_a_second_ct_or_case_behind_the_first_is_refused(lab, element):
+    assert lab.refused(lab.scene("</MRML>", f"{element}</MRML>")) == {"bundle-damaged"}
+
+
 def test_a_second_image_is_refused(lab):
     assert lab.refused({"hexafix/Data/other.nrrd": lab.files[IMAGE]}) == {"bundle-damaged"}
 
