@@ -204,6 +204,28 @@ def test_a_dragged_fragment_becomes_the_correction(sync, logic, presenter):
     assert np.abs(np.array(logic.fragment_motion_lps()) - wanted).max() > 1e-3
 
 
+@pytest.mark.parametrize("chosen", ["proximal", "distal"])
+def test_without_a_correction_the_fragment_chosen_on_screen_is_dragged(
+    sync, logic, presenter, chosen
+):
+    presenter.set_correction(None)
+    presenter.run(Step.POSES)
+    sync.drag_fragment(True, moving=chosen)
+    ghost, bone = (
+        find(logic.scene, f"model/{r}/{s}") for r, s in (("target", "bone"), ("bone", chosen))
+    )
+    assert ghost.GetPolyData().GetNumberOfPoints() == bone.GetPolyData().GetNumberOfPoints()
+    assert not sync.commit_fragment(), "a click that moves nothing is no correction"
+    assert presenter.snapshot.document["correction"] is None
+    node = find(logic.scene, transforms.TARGET)
+    wanted = Pose.from_xyz_fixed(position_mm=[2.0, 0.0, 1.0], angles_rad=[0, 0.1, 0]).matrix
+    node.SetMatrixTransformToParent(transforms.vtk_of_motion(wanted))
+    assert sync.commit_fragment()
+    assert presenter.snapshot.document["correction"]["moving"] == chosen
+    sync.drag_fragment(False)
+    assert not sync.commit_fragment()
+
+
 def test_playback_shows_the_plans_rows(sync, logic, presenter):
     presenter.run(Step.SCHEDULE)
     rows = presenter.playback().rows

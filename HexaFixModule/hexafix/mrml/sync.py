@@ -33,6 +33,9 @@ IN_THE_SCENE = (
 SAME_MOTION = 1e-9
 """Two motions are the same below this, in mm and in entries of the rotation."""
 
+UNMOVED = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
+"""The motion of a fragment that nobody moved, 4×4."""
+
 
 class SceneSync:
     """Keeps a scene and a presenter together.
@@ -56,6 +59,7 @@ class SceneSync:
         self._row: int | None = None
         self._updating = False
         self._dragging_target = False
+        self._wished = ""
         self._observers: list[tuple[Any, int]] = []
         self._observed: set[str] = set()
 
@@ -195,7 +199,7 @@ class SceneSync:
         recognised = self.presenter.value(Step.POSES)
         if recognised is None or not self.presenter.is_fresh(Step.POSES):
             return False
-        share, moving = self.presenter.split_fraction, _moving(snapshot.document)
+        share, moving = self.presenter.split_fraction, self._moving(snapshot.document)
         if not self._new("bone", (recognised, share, moving)):
             return False
         if self._new("samples", (recognised, share)):
@@ -254,6 +258,20 @@ class SceneSync:
 
     # ------------------------------------------------------------- and back
 
+    def drag_fragment(self, on: bool, *, moving: str = "") -> None:
+        """Show or hide the handles that drag the target of the moving fragment.
+
+        Parameters
+        ----------
+        on : bool
+        moving : str
+            The fragment chosen on screen; it counts while the case holds no correction.
+        """
+        if on:
+            self._wished = moving
+            self.update(self.presenter.snapshot)
+        self.logic.drag_fragment(on)
+
     def commit_fragment(self) -> bool:
         """Make the dragged target of the moving fragment the case's correction.
 
@@ -268,11 +286,17 @@ class SceneSync:
         matrix = self.logic.fragment_motion_lps()
         preview = self.presenter.value(Step.CORRECTION)
         known = None if preview is None else preview.get("asked_lps")
-        if known is not None and _near(matrix, known):
+        if _near(matrix, UNMOVED if known is None else known):
             return False
-        moving = _moving(self.presenter.snapshot.document)
+        moving = self._moving(self.presenter.snapshot.document)
         correction = {"kind": "fragment-motion", "moving": moving, "matrix_lps": matrix}
         return bool(self.presenter.set_correction(correction))
+
+    def _moving(self, document: Mapping[str, Any]) -> str:
+        """Which fragment the case moves, or the user means to, where it holds no correction."""
+        if self._wished and not document.get("correction"):
+            return self._wished
+        return _moving(document)
 
     def close(self) -> None:
         """Stop listening to the scene."""

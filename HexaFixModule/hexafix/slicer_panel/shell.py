@@ -173,7 +173,7 @@ class SlicerPanel:
             self._guarded(self.sync.commit_fragment)
 
     def _drag(self, on: bool) -> None:
-        self.logic.drag_fragment(on)
+        self.sync.drag_fragment(on, moving=self.panel.moving_fragment())
         if not on:
             self._guarded(self.sync.commit_fragment)
 

@@ -159,10 +159,10 @@ class Views:
         self._picked = picked
         self._hint()
 
-    def drag_fragment(self, on: bool) -> None:
-        """Show or hide the handles that drag the moving bone fragment."""
+    def drag_fragment(self, on: bool, moving: str = "") -> None:
+        """Show or hide the handles that drag the bone fragment `moving`."""
         self._dragging_fragment = on
-        self._logic.drag_fragment(on)
+        self._sync.drag_fragment(on, moving=moving)
 
     def show_playback_row(self, row: int | None) -> None:
         """Move frame and bone to a row of the schedule; None: back to what the CT shows."""

@@ -26,8 +26,8 @@ class ViewControls(Protocol):
         """Hand the next click's point (LPS, mm, three numbers) to `picked`; None ends it."""
         ...
 
-    def drag_fragment(self, on: bool) -> None:
-        """Show or hide the handles that drag the moving bone fragment."""
+    def drag_fragment(self, on: bool, moving: str = "") -> None:
+        """Show or hide the handles that drag the bone fragment `moving`."""
         ...
 
     def show_playback_row(self, row: int | None) -> None:
@@ -57,7 +57,7 @@ class NoViews:
     def pick_point(self, picked: Callable[[Sequence[float]], None] | None) -> None:
         """Take the wish for a point; none will come."""
 
-    def drag_fragment(self, on: bool) -> None:
+    def drag_fragment(self, on: bool, moving: str = "") -> None:
         """Take the mode."""
 
     def show_playback_row(self, row: int | None) -> None:

@@ -321,7 +321,7 @@ class CorrectionStep:
 
     def _toggle_drag(self) -> None:
         self._data.dragging = not self._data.dragging
-        self._context.controls.drag_fragment(self._data.dragging)
+        self._context.controls.drag_fragment(self._data.dragging, self._data.draft["moving"])
 
     def _pick(self, key: str) -> None:
         if self._data.picking:
