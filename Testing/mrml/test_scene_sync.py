@@ -1,5 +1,6 @@
 """The scene follows the presenter, and what is dragged in the scene becomes an edit of the case."""
 
+import hashlib
 import json
 from types import SimpleNamespace
 
@@ -100,6 +101,39 @@ def test_the_case_follows_every_edit_without_the_images_path(sync, logic, presen
     presenter.go_to(Step.READINGS)
     shell = parameter_node.read(find(logic.scene, "parameters"), parameter_node.ShellParameters)
     assert shell.step == "readings"
+
+
+def test_the_scene_knows_the_cases_file_and_how_far_the_work_has_come(
+    sync, logic, presenter, tmp_path
+):
+    def shell():
+        node = find(logic.scene, "parameters")
+        return parameter_node.read(node, parameter_node.ShellParameters)
+
+    own = hashlib.sha256((tmp_path / "case.json").read_bytes()).hexdigest()
+    assert (shell().caseFileSha256, shell().computedTo) == (own, "")
+    presenter.run(Step.MARKERS)
+    assert shell().computedTo == "numbering", "numbering follows by itself"
+    assert shell().inputVolume is logic.volume_node()
+    presenter.accept_relaxed_layout(True)
+    presenter.split_fraction = 0.25
+    assert (shell().acceptRelaxedLayout, shell().splitFraction) == (True, 0.25)
+    presenter.set_case_id("other")
+    assert shell().caseFileSha256 == hashlib.sha256(presenter.version.raw).hexdigest() != own
+
+
+def test_a_fixator_of_a_file_and_readings_typed_once_are_told_in_the_scene(
+    sync, logic, presenter, tmp_path
+):
+    from hexafix.paths import resources
+
+    definition = resources() / "Hardware" / "Frames" / "generic-6sps-160.json"
+    (tmp_path / "Doe.json").write_bytes(definition.read_bytes())
+    presenter.set_fixator(str(tmp_path / "Doe.json"))
+    presenter.set_reading(3, 171.5)
+    document = logic.case_document_from_scene()
+    assert document["fixator"] == json.loads(definition.read_text())
+    assert document["readings_to_repeat"] is True
 
 
 def test_nothing_is_rebuilt_without_need(sync, logic, presenter):

@@ -269,6 +269,27 @@ def test_the_case_that_was_open_last_is_offered_again(a_window, an_own_case):
     assert window.actions["recent"].isEnabled()
 
 
+def test_a_scene_is_opened_by_the_menu_with_its_case_and_ct(
+    a_window, a_phantom, settled, tmp_path, monkeypatch
+):
+    from hexafix.mrml import scene_file
+    from hexafix.presenter.scenes import SceneContent
+
+    path = tmp_path / "tibia.mrb"
+    path.write_bytes(b"read by a stand-in; Testing/mrml reads real ones")
+    content = SceneContent(a_phantom.case, "a" * 64, a_phantom.volume, computed_to="load")
+    monkeypatch.setattr(scene_file, "read_scene", lambda path, *, progress: content)
+    asked = []
+    monkeypatch.setattr(a_window.widgets, "ask_file", lambda *words: asked.append(words) or path)
+    a_window.actions["open"].trigger()
+    settled(a_window)
+    assert "*.mrb" in asked[0][1]
+    assert states(a_window)[Step.LOAD] == DONE
+    assert a_window.presenter.snapshot.case_id == a_phantom.case["case_id"]
+    assert a_window.presenter.value(Step.LOAD) is a_phantom.volume
+    assert not a_window.presenter.snapshot.edited
+
+
 def test_the_wheel_changes_no_choice_that_has_no_focus(a_window):
     from hexafix.qt.kit import kit
 
