@@ -151,6 +151,21 @@ def test_the_playback_moves_the_frame_to_its_last_day(a_planned_window, settled)
     slider.setValue(0)
 
 
+def test_a_pixel_on_a_ball_of_the_3d_view_names_it_and_one_beside_it_names_none(
+    a_planned_window, a_phantom, settled, pixels
+):
+    window = a_planned_window
+    window.presenter.go_to(Step.POSES)
+    settled(window)
+    view = window.stage.view3d
+    view.look((0, -1, 0), (0, 0, 1))
+    pixels(view.plotter)
+    for ball in a_phantom.truth["balls"]:
+        x, y = on_screen(view.plotter, ball["center_mm"])
+        assert view.ball_at(x, y) == f"ball-{ball['number']}"
+    assert view.ball_at(2, 2) is None
+
+
 def test_a_ball_clicked_in_the_3d_view_is_chosen_in_the_table(a_planned_window, settled):
     window = a_planned_window
     window.presenter.go_to(Step.MARKERS)

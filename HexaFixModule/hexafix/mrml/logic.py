@@ -23,7 +23,7 @@ from hexafix.mrml import (
 )
 from hexafix.mrml import transforms as places
 from hexafix.mrml import volume as volumes
-from hexafix.mrml.geometry import lps_points, motion_of_vtk, require_rigid, vtk_of_motion
+from hexafix.mrml.geometry import motion_of_vtk, ras_points, require_rigid, vtk_of_motion
 from hexafix.mrml.nodes import find, remove
 from hexafix.progress import Progress, silent
 from hexafix.report.scene import BoneSample, SceneGeometry
@@ -321,11 +321,6 @@ class SceneLogic:
         models.set_shown(self.scene, GROUPS[what], shown)
 
     @staticmethod
-    def lps_from_ras(point_ras_mm: Sequence[float]) -> list[float]:
-        """A point of a view, RAS mm, as the chain knows it, LPS mm."""
-        return lps_points(point_ras_mm).tolist()
-
-    @staticmethod
     def ras_from_lps(point_lps_mm: Sequence[float]) -> list[float]:
         """A point, LPS mm, for a view, RAS mm."""
-        return lps_points(point_lps_mm).tolist()
+        return ras_points(point_lps_mm).tolist()

@@ -208,9 +208,6 @@ class QtWidgets:
             font.setItalic(True)
             item.setFont(font)
 
-    def _set_text(self, widget: Any, text: str) -> None:
-        widget.setText(text)
-
     def _set_html(self, widget: Any, html: str) -> None:
         widget.setHtml(html)
         # As high as the messages, up to the height that the .ui allows.

@@ -23,7 +23,7 @@ class View3D:
     Parameters
     ----------
     ball_clicked : callable
-        Called with a ball's name as shown, e.g. ``ball-3``, and its centre in LPS mm.
+        Called with a ball's name as shown, e.g. ``ball-3``.
     dragged : callable
         Called with the 4×4 motion, LPS mm, when the user lets the bone go.
     """
@@ -101,7 +101,7 @@ class View3D:
             self._actors[name] = self._add(name, outline)
         if meshes and not self._fitted:
             self._fitted = True
-            self.look((-1, -2, 1) if "bone" in meshes else (0, -1, 0), (0, 0, 1))
+            self.look((0, -1, 0), (0, 0, 1))
         if not meshes:
             self._fitted = False
 
@@ -222,12 +222,12 @@ class View3D:
 
         picker = vtkPropPicker()
         picker.PickFromListOn()
-        balls = {id(actor): name for name, actor in self._actors.items() if "ball-" in name}
-        for name, actor in self._actors.items():
-            if name.startswith("ball-"):
-                picker.AddPickList(actor)
+        balls = {name: actor for name, actor in self._actors.items() if name.startswith("ball-")}
+        for actor in balls.values():
+            picker.AddPickList(actor)
         picker.Pick(float(x), float(y), 0.0, self.plotter.renderer)
-        return balls.get(id(picker.GetActor()))
+        hit = picker.GetActor()
+        return next((name for name, actor in balls.items() if actor is hit), None)
 
     def close(self) -> None:
         """Free the window's OpenGL while it can still be reached."""
