@@ -345,6 +345,7 @@ def test_fields_not_taken_are_told_by_what_stands_beside_them():
         "again-6": "strut 6 again",
         "schedule-max_rate_mm_per_day": "fastest motion",
         "distal-0-sweep_deg": "layout of the distal ring, row 1, sweep",
+        "risk-1-P": "structures at risk, point 2, P",
         "ball-diameter": "diameter of the marker balls",
         "limb-side": "side of the limb",
         "case-id": "name of the case",

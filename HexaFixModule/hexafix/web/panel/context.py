@@ -153,6 +153,8 @@ def field_words(name: str) -> str:
         return f"strut {rest}" + (" again" if top == "again" else "")
     if top in ("proximal", "distal"):
         return place_words(f"markers.{top}[{row}].{key}")
+    if top == "risk":
+        return place_words(f"schedule.structures_at_risk_lps_mm[{row}][{'LPS'.index(key)}]")
     return place_words(f"schedule.{rest}" if top == "schedule" else FIELDS.get(name, name))
 
 

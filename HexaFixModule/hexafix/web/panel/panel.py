@@ -68,6 +68,7 @@ class Panel:
         self._pages = PrescriptionPages(context)
         self._export = ExportStep(context, self._chooser, self._pages)
         self._playback = Playback(context)
+        self._schedule = ScheduleStep(context, self._playback.build_curves)
         self._stepper = Stepper(
             context,
             {
@@ -77,7 +78,7 @@ class Panel:
                 "poses": PosesStep(context).build,
                 "readings": self._readings.build,
                 "correction": self._correction.build,
-                "schedule": ScheduleStep(context, self._playback.build_curves).build,
+                "schedule": self._schedule.build,
                 "export": self._export.build,
             },
         )
@@ -127,6 +128,7 @@ class Panel:
         self._markers.stop()
         self._numbering.data.picked = ""
         self._correction.stop()
+        self._schedule.stop()
 
     def update(self, snapshot: Snapshot) -> None:
         """Push a snapshot to the browser: only what changed is sent."""
@@ -145,6 +147,7 @@ class Panel:
                 snapshot, presenter.value(Step.NUMBERING), presenter.is_fresh(Step.NUMBERING)
             )
             self._correction.update(snapshot, self._center())
+            self._schedule.update(snapshot)
             self._show_plan(snapshot)
             files = presenter.prescription_files()
             self._pages.update(files)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexafix.web.panel.context import PanelContext, number, whole_number
+from hexafix.web.panel.risk import RiskPoints
 from hexafix.web.panel.widgets import button, choice, field, marked, note, table
 from hexafix.web.state import NUMBERS_OF_SCHEDULE
+
+if TYPE_CHECKING:
+    from hexafix.presenter import Snapshot
 
 LABELS = {
     "adjustments_per_day": ("Adjustments a day", ""),
@@ -34,6 +38,7 @@ class ScheduleStep:
 
     def __init__(self, context: PanelContext, curves: Callable[[], None]) -> None:
         self._context, self._curves = context, curves
+        self._risk = RiskPoints(context)
 
     def build(self) -> None:
         """Make the step's fields, tables and curves."""
@@ -73,6 +78,7 @@ class ScheduleStep:
             "The fastest motion is that of the structures at risk, where the case names them, "
             "else of the moving ring."
         )
+        self._risk.build()
         button(
             "Plan",
             "run-schedule",
@@ -93,6 +99,14 @@ class ScheduleStep:
                 **marked("schedule-summary"),
             )
             table(context, "strut_plan", "Scale values to set, mm")
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Show the document's structures at risk."""
+        self._risk.update(snapshot.document)
+
+    def stop(self) -> None:
+        """Wait for no click any more."""
+        self._risk.stop()
 
     def _set(self, key: str, text: str) -> None:
         where, name = f"schedule.{key}", f"schedule-{key}"
