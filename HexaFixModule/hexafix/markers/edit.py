@@ -13,6 +13,7 @@ from hexafix.markers import predicates
 from hexafix.markers.ball import Ball, BallSet, Rejected
 from hexafix.markers.crop import Crop
 from hexafix.markers.find import (
+    OVERLAP_MM,
     SURROUND_MM,
     FittedBall,
     check_diameter,
@@ -202,12 +203,12 @@ def _with_material(fitted: FittedBall, others: list[Ball]) -> Ball:
 def _refuse_double(ball: Ball, others: list[Ball], radius: float, place: int) -> None:
     """A ball that overlaps another one is not a second ball."""
     away = [float(np.linalg.norm(ball.center_mm - other.center_mm)) for other in others]
-    if away and min(away) < 2.0 * radius - 0.6:
+    if away and min(away) < 2.0 * radius - OVERLAP_MM:
         raise InputError.of(
             "added-ball-twice",
             "a ball is to be added where there is one already",
             value=f"{min(away):.1f} mm from another ball",
-            limit=f"{2.0 * radius - 0.6:.1f} mm",
+            limit=f"{2.0 * radius - OVERLAP_MM:.1f} mm",
             where=f"marker_edits.added_lps_mm[{place}]",
             hazard="H15",
             next_step="take this point out of the edits, or remove the other ball first",

@@ -35,6 +35,8 @@ SURROUND_MM = 4.5
 """What is cut out around a ball, beyond its radius."""
 ROUGH_SLACK = 2.0
 """Factor on the limits of shape while the fit is rough."""
+OVERLAP_MM = 0.6
+"""Two fits may come nearer than two radii by this much: balls that touch, each off a little."""
 MOST_LISTED = 40
 """At most so many rejected candidates are listed, the roundest first."""
 
@@ -223,7 +225,7 @@ def _apart(fitted: list[FittedBall], radius: float) -> tuple[list[FittedBall], l
     for one in sorted(fitted, key=lambda f: f.ball.rms_residual_mm):
         gaps = [float(np.linalg.norm(one.ball.center_mm - k.ball.center_mm)) for k in kept]
         nearest = min(gaps, default=np.inf)
-        if nearest >= 2.0 * radius - 0.6:
+        if nearest >= 2.0 * radius - OVERLAP_MM:
             kept.append(one)
         elif nearest > 0.5 * radius:
             reason = f"overlap: {nearest:.1f} mm from another ball, limit {2 * radius:.1f} mm"
