@@ -3,6 +3,7 @@
 import copy
 import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -128,28 +129,37 @@ def odd_documents(whole_documents):
 
 
 @pytest.fixture(scope="session")
-def a_recognised(a_phantom):
-    """What the chain recognises in the phantom."""
-    from pathlib import Path
-
+def a_read_case(a_phantom):
+    """The phantom's case as it is; there is no image in its folder."""
     from hexafix.case import case_from_document
-    from hexafix.pipeline import recognise
 
     raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
-    return recognise(case, a_phantom.volume)
+    return case_from_document(raw, folder=Path(), needs_image=False)
 
 
 @pytest.fixture(scope="session")
-def an_export(a_phantom, tmp_path_factory):
+def a_recognised(a_phantom, a_read_case):
+    """What the chain recognises in the phantom."""
+    from hexafix.pipeline import recognise
+
+    return recognise(a_read_case, a_phantom.volume)
+
+
+@pytest.fixture(scope="session")
+def a_plan(a_read_case, a_recognised):
+    """The plan of the phantom's case; do not change it."""
+    from hexafix.pipeline import plan_recognised
+
+    return plan_recognised(a_read_case, a_recognised)
+
+
+@pytest.fixture(scope="session")
+def an_export(a_phantom, a_read_case, tmp_path_factory):
     """An export of the phantom's plan; copy it before changing it."""
-    from hexafix.case import case_from_document
     from hexafix.pipeline import plan_and_export
 
     folder = tmp_path_factory.mktemp("export")
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=folder, needs_image=False)
-    plan_and_export(case, folder / "prescription", volume=a_phantom.volume)
+    plan_and_export(a_read_case, folder / "prescription", volume=a_phantom.volume)
     return folder / "prescription"
 
 

@@ -4,14 +4,12 @@ import os
 
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hexafix.case import case_from_document
 from hexafix.geometry import Pose
 from hexafix.imaging import Volume
 from hexafix.mrml import HeadlessMrmlApp, SceneLogic
@@ -36,34 +34,21 @@ class Planned:
     app: Any
     logic: SceneLogic
     case: Any
-    plan: Any
     document: dict
     export: Path
     volume_node: Any
 
 
 @pytest.fixture(scope="session")
-def planned(a_phantom, tmp_path_factory):
+def planned(a_phantom, a_read_case, tmp_path_factory):
     """Volume node in, nodes and export out; do not change it."""
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
     app = HeadlessMrmlApp()
     logic = SceneLogic(app.scene, app_logic=app.app_logic)
     node = logic.add_volume(a_phantom.volume)
     folder = tmp_path_factory.mktemp("plan") / "export"
-    document = logic.plan(node, case, folder)
-    yield Planned(app, logic, case, None, document, folder, node)
+    document = logic.plan(node, a_read_case, folder)
+    yield Planned(app, logic, a_read_case, document, folder, node)
     app.close()
-
-
-@pytest.fixture(scope="session")
-def a_plan(a_phantom, a_recognised):
-    """The phantom's plan as the pipeline makes it."""
-    from hexafix.pipeline import plan_recognised
-
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
-    return plan_recognised(case, a_recognised)
 
 
 @pytest.fixture(scope="session")

@@ -1,20 +1,8 @@
-"""The phantom's plan, made once, and cases with their parts changed."""
+"""Cases with their parts changed."""
 
 import json
-from pathlib import Path
 
 import pytest
-
-
-@pytest.fixture(scope="session")
-def a_plan(a_phantom, a_recognised):
-    """The plan of the phantom's case; do not change it."""
-    from hexafix.case import case_from_document
-    from hexafix.pipeline import plan_recognised
-
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
-    return plan_recognised(case, a_recognised)
 
 
 @pytest.fixture

@@ -15,16 +15,9 @@ from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture(scope="module")
-def scene(a_recognised, a_phantom):
+def scene(a_recognised, a_read_case):
     """Balls, layouts and the right ball of each number."""
-    import json
-    from pathlib import Path
-
-    from hexafix.case import case_from_document
-
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
-    layouts = {"proximal": case.proximal, "distal": case.distal}
+    layouts = {"proximal": a_read_case.proximal, "distal": a_read_case.distal}
     return a_recognised.balls, layouts, a_recognised.numbering.ball_of_number
 
 

@@ -1,8 +1,5 @@
 """The bone's surface lies where the voxels are, whatever the hand of their grid."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hexafix import surfaces
@@ -124,14 +121,11 @@ def test_the_sample_is_not_changed():
     np.testing.assert_array_equal(sample.ijk_to_lps, before)
 
 
-def test_the_phantoms_bone_runs_through_both_rings(a_phantom, a_recognised, triangles):
-    from hexafix.case import case_from_document
+def test_the_phantoms_bone_runs_through_both_rings(a_phantom, a_read_case, a_recognised, triangles):
     from hexafix.pipeline.document import recognition
     from hexafix.report.scene import SceneGeometry, sample_bone
 
-    raw = json.dumps(a_phantom.case).encode()
-    case = case_from_document(raw, folder=Path(), needs_image=False)
-    seen = {**recognition(case, a_recognised), "case": dict(case.document)}
+    seen = {**recognition(a_read_case, a_recognised), "case": dict(a_read_case.document)}
     scene = SceneGeometry.from_document(seen)
     mesh = surfaces.bone_surface(sample_bone(a_phantom.volume, scene))
     assert 5_000 < mesh.GetNumberOfCells() <= 61_000
