@@ -168,8 +168,7 @@ def test_a_saved_scene_is_opened_by_another_server_and_gives_the_same_files(
     save_scene(a_planned_desk, tmp_path / "tibia")
     a_planned_desk.at("scene-saved").wait_for(timeout=LONG_MS)
     a_planned_desk.click("close-scene-line")
-    desk = a_new_desk()
-    open_file(desk, tmp_path / "tibia.mrb")
+    desk = a_new_desk(tmp_path / "tibia.mrb")
     # planned before it was saved, so planned again
     desk.wait("export", "done")
     desk.at("playback").wait_for()
@@ -190,11 +189,22 @@ def test_a_saved_scene_is_opened_by_another_server_and_gives_the_same_files(
     desk.at("banner").filter(has_text="damaged").wait_for(timeout=LONG_MS)
     assert desk.at("step-export").get_attribute("data-state") == "done"
     assert desk.at("files").count() == 1
+    desk.open("load")
+    desk.write("case-id", "edited")
+    desk.wait("export", "stale")
+    open_file(desk, tmp_path / "tibia.mrb")
+    desk.wait("export", "done")
+    desk.at("body-export").wait_for()  # the step at which it was saved
+    desk.open("load")
+    assert desk.at("case-id").locator("input").input_value() == case_id(a_planned_desk)
     assert desk.page.said == []
 
 
 def open_file(desk, path):
+    edited = desk.at("unsaved").count()
     desk.click("open-case")
+    if edited:
+        desk.click("ask-go-on")
     desk.at("chooser-path").locator("input").fill(str(path))
     desk.click("chooser-accept")
 
