@@ -10,7 +10,8 @@ from cyclopts import Parameter
 
 def desktop(
     case: Annotated[
-        Path | None, Parameter(help="A case file, or a folder that holds case.json.")
+        Path | None,
+        Parameter(help="A case file, a folder that holds case.json, or a scene (.mrb)."),
     ] = None,
 ) -> int:
     """Open the workstation in a window; needs a display and hexafix[qt]."""

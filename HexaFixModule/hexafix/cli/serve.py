@@ -14,7 +14,9 @@ from hexafix.errors import InputError, MissingLibrary
 
 
 def serve(
-    case: Annotated[Path | None, Parameter(help="The case file; none: an empty case.")] = None,
+    case: Annotated[
+        Path | None, Parameter(help="The case file, or a scene (.mrb); none: an empty case.")
+    ] = None,
     *,
     host: Annotated[
         str, Parameter(help="Address to listen on; any but this machine's own needs --token.")
