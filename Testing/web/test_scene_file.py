@@ -1,6 +1,7 @@
 """Saving the scene: where it goes, what is asked before, what is told after."""
 
 import asyncio
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -15,10 +16,20 @@ class Views(NoViews):
     """Views that write what they are told to, or raise."""
 
     fault: Exception | None = None
+    late: Exception | None = None
+    thread = None
 
-    def save_scene(self, path):
+    def take_scene(self):
         if self.fault is not None:
             raise self.fault
+        return self
+
+    def write(self, path, *, progress):
+        self.thread = threading.current_thread()
+        for part in range(101):
+            progress("pack the CT", part / 100)
+        if self.late is not None:
+            raise self.late
         path.write_bytes(b"scene")
 
 
@@ -89,3 +100,29 @@ def test_no_scene_is_saved_while_a_field_shows_what_the_case_does_not_hold(scene
     take(scene, tmp_path / "tibia.mrb")
     assert scene._context.data.notice["code"] == "field-not-taken"
     assert not (tmp_path / "tibia.mrb").exists()
+
+
+def test_the_file_is_written_off_the_pages_thread_and_progress_is_told(scene, views, tmp_path):
+    told = []
+    show = scene._show
+    scene._show = lambda percent: (told.append(percent), show(percent))
+    take(scene, tmp_path / "tibia.mrb")
+    assert views.thread is not threading.current_thread()
+    assert told
+    assert told == sorted(told)
+    assert max(told) <= 100
+
+
+@pytest.mark.parametrize("kind", [InputError, Refused])
+def test_what_hinders_the_writing_is_told_too(scene, views, tmp_path, kind):
+    views.late = kind.of("bundle-not-written", "the disk is full", hazard="H46")
+    take(scene, tmp_path / "tibia.mrb")
+    assert scene._context.data.notice["code"] == "bundle-not-written"
+    assert (scene._data.saved, scene._data.saving) == ("", False)
+
+
+def test_a_workstation_that_ends_stops_the_writing(scene, views, tmp_path):
+    scene._ended.set()
+    take(scene, tmp_path / "tibia.mrb")
+    assert not (tmp_path / "tibia.mrb").exists()
+    assert (scene._data.saved, scene._data.saving) == ("", False)

@@ -19,6 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from hexafix.errors import Fault, InputError, Refused
+from hexafix.progress import Progress, silent
 
 MAX_RATIO = 100
 """An entry may inflate to so many times its packed size, and so may all together."""
@@ -33,17 +34,35 @@ SMALL_BYTES = 64 * 1024
 
 MAX_NAME = 200
 
+IMAGE = ".nrrd"
+"""Ending of an image, whose voxels are packed inside its own file."""
+
 _BLOCK = 1 << 20
+_LEVEL = 1
+"""Of the packing: a CT is mostly noise, and more time makes it no smaller."""
+
+_GZIP = 31
+"""zlib's name for a gzip stream; it holds no time and no name."""
+
 _END_RECORD = struct.Struct("<4s4H2LH")
 _DATE = (1980, 1, 1, 0, 0, 0)
 """Of every entry: when a scene was saved tells nothing, and the same scene packs the same."""
 
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_DEFLATED = zipfile.ZIP_DEFLATED
+_METHODS = (zipfile.ZIP_STORED, _DEFLATED)
 NEXT_STEP = "open only bundles that HexaFix saved, and that came a way you trust"
 
 
-def pack(folder: Path, target: Path) -> None:
+def pack(folder: Path, target: Path, *, progress: Progress = silent) -> None:
     """Write everything below `folder` as the archive `target`, all or nothing (H46).
+
+    Parameters
+    ----------
+    folder : Path
+        Its images are packed in place first: noise shrinks once, and an image of air alone, packed
+        twice, would unpack like an attack (H48).
+    target : Path
+    progress : Progress, optional
 
     Raises
     ------
@@ -53,6 +72,9 @@ def pack(folder: Path, target: Path) -> None:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     beside: Path | None = None
     try:
+        for path in files:
+            if path.suffix == IMAGE:
+                _pack_image(path, progress)
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         beside = Path(name)
         with os.fdopen(handle, "wb") as stream:
@@ -61,10 +83,11 @@ def pack(folder: Path, target: Path) -> None:
             os.fsync(stream.fileno())
         beside.replace(target)
     except (OSError, zipfile.LargeZipFile) as error:
+        raise not_written(getattr(error, "strerror", None) or str(error)) from error
+    finally:
         if beside is not None:
             with contextlib.suppress(OSError):
-                beside.unlink()
-        raise not_written(getattr(error, "strerror", None) or str(error)) from error
+                beside.unlink(missing_ok=True)
 
 
 def not_written(why: str) -> InputError:
@@ -81,9 +104,27 @@ def _write_entries(stream: BinaryIO, folder: Path, files: list[Path]) -> None:
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, allowZip64=False) as archive:
         for path in files:
             entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), _DATE)
-            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.compress_type = zipfile.ZIP_STORED if path.suffix == IMAGE else _DEFLATED
             entry.external_attr = (stat.S_IFREG | 0o644) << 16
             archive.writestr(entry, path.read_bytes(), compresslevel=1)
+
+
+def _pack_image(path: Path, progress: Progress) -> None:
+    """Pack the voxels of an image as it was written plain; the same ones pack the same.
+
+    Block by block, so that other threads go on and the user can stop it.
+    """
+    packed = path.with_suffix(".packed")
+    size, packer = path.stat().st_size, zlib.compressobj(_LEVEL, wbits=_GZIP)
+    with path.open("rb") as plain, packed.open("wb") as file:
+        while (line := plain.readline()) not in (b"\n", b"\r\n", b""):
+            file.write(b"encoding: gzip\n" if line.rstrip() == b"encoding: raw" else line)
+        file.write(b"\n")
+        while block := plain.read(_BLOCK):
+            file.write(packer.compress(block))
+            progress("pack the CT", plain.tell() / size)
+        file.write(packer.flush())
+    packed.replace(path)
 
 
 def unpack(source: Path, folder: Path) -> list[PurePosixPath]:

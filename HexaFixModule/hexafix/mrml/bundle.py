@@ -15,24 +15,74 @@ from typing import Any
 from hexafix.errors import Refused
 from hexafix.mrml import hierarchy
 from hexafix.mrml.app import HeadlessMrmlApp
-from hexafix.mrml.archive import not_written, pack, unpack
+from hexafix.mrml.archive import IMAGE, not_written, pack, unpack
 from hexafix.mrml.bundle_content import NEXT_STEP, SCENE_FILE, check_content
 from hexafix.mrml.markups import ROWS
 from hexafix.mrml.nodes import ROLE, nodes_of, remove
 from hexafix.mrml.parameter_node import stored_document
 from hexafix.mrml.transfer import copy_nodes
+from hexafix.progress import Progress, silent
 
 TOP = "hexafix"
 """The archive's one folder; its name says nothing of case or patient."""
 
 EXTENSIONS = {
-    "vtkMRMLScalarVolumeNode": ".nrrd",
+    "vtkMRMLScalarVolumeNode": IMAGE,
     "vtkMRMLModelNode": ".vtp",
     "vtkMRMLMarkupsFiducialNode": ".mrk.json",
     "vtkMRMLLinearTransformNode": ".tfm",
     "vtkMRMLTableNode": ".tsv",
 }
 """Class of a node and the kind of file that holds its content."""
+
+
+class TakenBundle:
+    """A scene as it was when it was taken, to be written on any thread and whatever becomes of it.
+
+    Nothing of MRML is left in it: the files of a bundle, in a folder of their own until they are
+    written or given up.
+
+    Parameters
+    ----------
+    scene : vtkMRMLScene
+        On its own thread; its voxels are not packed yet, so that this takes moments.
+
+    Raises
+    ------
+    InputError
+        If there is no room for its files.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        self._work = tempfile.TemporaryDirectory(prefix="hexafix-")
+        try:
+            write_files(scene, Path(self._work.name))
+        except BaseException:
+            self.give_up()
+            raise
+
+    def write(self, path: Path, *, progress: Progress = silent) -> None:
+        """Write the bundle, all or nothing, and forget it.
+
+        Parameters
+        ----------
+        path : Path
+            The file, ``.mrb``.
+        progress : Progress, optional
+
+        Raises
+        ------
+        InputError
+            If it cannot be written; an older file is left as it was.
+        """
+        try:
+            pack(Path(self._work.name), Path(path), progress=progress)
+        finally:
+            self.give_up()
+
+    def give_up(self) -> None:
+        """Forget it."""
+        self._work.cleanup()
 
 
 def save_bundle(scene: Any, path: Path) -> None:
@@ -49,11 +99,16 @@ def save_bundle(scene: Any, path: Path) -> None:
     InputError
         If it cannot be written; an older file is left as it was.
     """
-    with HeadlessMrmlApp() as app, tempfile.TemporaryDirectory(prefix="hexafix-") as work:
+    TakenBundle(scene).write(path)
+
+
+def write_files(scene: Any, work: Path) -> None:
+    """Write the files of a bundle, its voxels plain, below an empty folder."""
+    with HeadlessMrmlApp() as app:
         nodes = copy_nodes(scene, app.scene)
         document = stored_document(app.scene) or {}
         hierarchy.arrange(app.scene, str(document.get("case_id") or "case"))
-        top = Path(work) / TOP
+        top = work / TOP
         (top / "Data").mkdir(parents=True)
         app.scene.SetRootDirectory(str(top))
         for role, node in nodes.items():
@@ -61,7 +116,6 @@ def save_bundle(scene: Any, path: Path) -> None:
         app.scene.SetURL(str(top / SCENE_FILE))
         if not app.scene.Commit():
             raise not_written("no room for its scene file")
-        pack(Path(work), Path(path))
 
 
 def _write(node: Any, stem: Path) -> None:
@@ -71,14 +125,17 @@ def _write(node: Any, stem: Path) -> None:
         return
     node.AddDefaultStorageNode()
     storage = node.GetStorageNode()
-    # Shapes as plain text, so that every number can be checked when they come back.
-    if extension == ".nrrd":
+    # Shapes as plain text, so that every number can be checked when they come back; voxels are
+    # packed with the bundle.
+    if extension == IMAGE:
         # Left as it is stored: a mirrored index must come back mirrored.
         storage.SetForceRightHandedIJKCoordinateSystem(False)
-    storage.SetUseCompression(extension != ".vtp")
+    storage.SetUseCompression(extension not in (".vtp", IMAGE))
     storage.SetFileName(f"{stem}{extension}")
     if not storage.WriteData(node):
         raise not_written(f"no room for its {extension} files")
+    if extension == IMAGE:
+        storage.SetUseCompression(True)  # as it will be once it is packed
 
 
 def open_bundle(scene: Any, path: Path) -> None:

@@ -125,6 +125,10 @@ class SceneLogic:
         """Save our nodes as a scene bundle (``.mrb``) that names nobody."""
         bundle.save_bundle(self.scene, path)
 
+    def take_bundle(self) -> bundle.TakenBundle:
+        """The same as it is now, to be written on any thread."""
+        return bundle.TakenBundle(self.scene)
+
     def open_bundle(self, path: Path) -> None:
         """Replace our nodes by those of a bundle; a refused one leaves the scene as it was."""
         bundle.open_bundle(self.scene, path)

@@ -13,6 +13,7 @@ from hexafix.errors import Refused
 from hexafix.markers import BallSet
 from hexafix.mrml import markups
 from hexafix.mrml import transforms as places
+from hexafix.mrml.bundle import TakenBundle
 from hexafix.mrml.logic import SceneLogic
 from hexafix.mrml.nodes import find
 from hexafix.pipeline import bone_fragments
@@ -94,12 +95,11 @@ class SceneSync:
         self.logic.show_playback_row(playback, index if playback is not None else None)
 
     def save_bundle(self, path: Path) -> None:
-        """Save the scene, with frame and bone where the CT shows them.
+        """Save the scene at once, as `take_bundle` takes it, all or nothing."""
+        self.take_bundle().write(path)
 
-        Parameters
-        ----------
-        path : Path
-            The file, ``.mrb``.
+    def take_bundle(self) -> TakenBundle:
+        """The scene as it is now, with frame and bone where the CT shows them, to be written.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class SceneSync:
             While the scene shows what is not of the case that is saved with it (H40): a file
             tells nobody what was grey.
         InputError
-            If it cannot be written; an older file is left as it was.
+            If there is no room for its files.
         """
         older = self._out_of_date()
         if older:
@@ -120,7 +120,7 @@ class SceneSync:
         shown = self._row
         self.show_playback_row(None)
         try:
-            self.logic.save_bundle(path)
+            return self.logic.take_bundle()
         finally:
             self.show_playback_row(shown)
 

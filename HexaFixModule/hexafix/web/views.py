@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hexafix.web.clicks import Clicks
@@ -174,9 +173,9 @@ class Views:
         """Show landmark points (LPS, mm, n rows of 3 each)."""
         self._logic.show_landmarks(moving, fixed)
 
-    def save_scene(self, path: Path) -> None:
-        """Save the scene as a bundle; a refusal or an error of the disk is raised."""
-        self._sync.save_bundle(path)
+    def take_scene(self) -> Any:
+        """The scene as it is now, whose ``write(path, progress=…)`` any thread may call."""
+        return self._sync.take_bundle()
 
     def close(self) -> None:
         """Let go of the render windows."""

@@ -6,6 +6,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from hexafix.progress import Progress, silent
+
+
+class TakenScene(Protocol):
+    """A scene as it was when it was taken."""
+
+    def write(self, path: Path, *, progress: Progress = silent) -> None:
+        """Write it, on any thread, all or nothing; an error of the disk is raised."""
+        ...
+
 
 class ViewControls(Protocol):
     """The workstation's views as the side panel sees them; the panel answers clicks by name.
@@ -40,9 +50,16 @@ class ViewControls(Protocol):
         """Show landmark points (LPS, mm, n rows of 3 each)."""
         ...
 
-    def save_scene(self, path: Path) -> None:
-        """Save the scene as a bundle; a refusal or an error of the disk is raised."""
+    def take_scene(self) -> TakenScene:
+        """The scene as it is now; a refusal is raised."""
         ...
+
+
+class NoScene:
+    """A scene of nothing: nothing is written."""
+
+    def write(self, path: Path, *, progress: Progress = silent) -> None:
+        """Take the path."""
 
 
 class NoViews:
@@ -68,5 +85,6 @@ class NoViews:
     ) -> None:
         """Take the points (LPS, mm, n rows of 3 each)."""
 
-    def save_scene(self, path: Path) -> None:
-        """Take the path."""
+    def take_scene(self) -> TakenScene:
+        """A scene of nothing."""
+        return NoScene()

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import os
+import threading
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from hexafix.errors import Cancelled, HexaFixError
+from hexafix.progress import Progress
 from hexafix.web.files import SCENE_SUFFIXES
 from hexafix.web.panel.chooser import Chooser
 from hexafix.web.panel.context import PanelContext, typed_state
+from hexafix.web.panel.controls import TakenScene
 from hexafix.web.panel.widgets import button, icon_button, marked
 
 PROPOSED = f"scene{SCENE_SUFFIXES[0]}"
 
 SHOWN_S = 0.1
 """Time for the browser to say that the scene is being saved: MRML's nodes belong to this thread,
-which then answers nothing until the file is whole."""
+which answers nothing until it has taken them."""
+
+TOLD_PERCENT = 5
+"""Progress is told when it grew by this much."""
 
 
 @dataclass
@@ -30,6 +38,8 @@ class SceneState:
     path : str
         Where the scene goes.
     saving : bool
+    percent : int
+        How much is written.
     saved : str
         Where the scene was saved last; empty once that was read.
     """
@@ -37,6 +47,7 @@ class SceneState:
     asking: bool = False
     path: str = ""
     saving: bool = False
+    percent: int = 0
     saved: str = ""
 
 
@@ -46,6 +57,7 @@ class SceneFile:
     def __init__(self, context: PanelContext, chooser: Chooser) -> None:
         self._context, self._chooser = context, chooser
         self._data, self._name = typed_state(context.server, SceneState)
+        self._ended = threading.Event()
         self.task: asyncio.Task[None] | None = None
 
     def build(self) -> None:
@@ -74,7 +86,9 @@ class SceneFile:
         ):
             v.VIcon(icon="mdi-information", size="small", color="info")
             with html.Div(classes="hxp-banner-text"):
-                html.Span("The scene is being saved …", v_if=name.saving)
+                html.Span(
+                    f"The scene is being saved … {{{{ {name.percent} }}}} %", v_if=name.saving
+                )
                 html.Span(
                     f"The scene is saved: {{{{ {name.saved} }}}}",
                     v_else=True,
@@ -136,23 +150,54 @@ class SceneFile:
 
     def _begin(self) -> None:
         if not self._data.saving:
-            self._data.saving, self._data.saved = True, ""
+            self._data.saving, self._data.percent, self._data.saved = True, 0, ""
             self.task = asyncio.get_running_loop().create_task(self._save(self._data.path))
 
     async def _save(self, path: str) -> None:
         await asyncio.sleep(SHOWN_S)
-        with self._context.server.state:
-            try:
-                if self._context.plan(lambda: self._context.controls.save_scene(Path(path))):
+        context, loop = self._context, asyncio.get_running_loop()
+        taken: list[TakenScene] = []
+        try:
+            context.plan(lambda: taken.append(context.controls.take_scene()))
+            for scene in taken:
+                told = self._teller(loop)
+                await loop.run_in_executor(None, partial(scene.write, Path(path), progress=told))
+                with context.server.state:
                     self._data.saved = path
-            finally:
+        except HexaFixError as error:
+            with context.server.state:
+                context.tell(error)
+        finally:
+            with context.server.state:
                 self._data.saving = False
+
+    def _teller(self, loop: asyncio.AbstractEventLoop) -> Progress:
+        """What the writing thread reports to; it stops it when the workstation ends."""
+        shown = 0
+
+        def told(step: str, fraction: float) -> None:
+            nonlocal shown
+            if self._ended.is_set():
+                raise Cancelled.of(
+                    "cancelled", "the scene was not saved", next_step="save it again"
+                )
+            percent = round(100 * fraction)
+            if percent >= shown + TOLD_PERCENT:
+                shown = percent
+                loop.call_soon_threadsafe(self._show, percent)
+
+        return told
+
+    def _show(self, percent: int) -> None:
+        with self._context.server.state:
+            self._data.percent = percent
 
     def _close_line(self) -> None:
         self._data.saved = ""
 
     def close(self) -> None:
-        """Begin no more saving."""
+        """Stop saving; an older file stays."""
+        self._ended.set()
         if self.task is not None:
             self.task.cancel()
 
