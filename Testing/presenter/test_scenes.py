@@ -140,6 +140,7 @@ def test_readings_typed_once_are_still_to_be_repeated(
         ("no scene", "bundle-damaged"),
         ({"document": {}}, "not-a-case"),
         ({"document": {"schema_version": True}}, "not-a-case"),
+        ({"document": {"schema_version": 1, "case_id": "\ud800"}}, "not-json"),
     ],
 )
 def test_a_refused_scene_leaves_the_open_case_as_it_was(

@@ -38,6 +38,9 @@ An export needs all eight steps done, and three answers: the side said a second 
 (H37), readings that were typed here entered a second time (H24), and, where the case holds that
 question, the rings' front confirmed (H22).
 
+**Scenes.** A scene's file is opened as a case whose CT lies in that file (`scenes`); the door gives
+the reader. It is read whole on the working thread; the open case is replaced last, or stays.
+
 **Threads.** Long steps work on one thread of their own; `post` brings each new snapshot to the
 door's thread. Stopping them leaves older results as they are. Actions never raise: they return
 whether they were done, and what was wrong is a banner; a defect is told by its type and place,

@@ -111,7 +111,7 @@ def opened(content: SceneContent, file: Path, engine: Engine) -> OpenedScene:
         document.pop("image", None)
     else:
         document["image"] = {"path": file.name, "series_instance_uid": None}
-    raw = document_bytes(document)
+    raw = _bytes(document)
     # Readings typed once make another case than its file holds.
     origin = None if typed_once else Origin(hashlib.sha256(raw).hexdigest(), content.case_sha256)
     version = Version(raw, file.parent, content.relaxed, "open the scene", origin)
@@ -134,6 +134,18 @@ def case_for_scene(version: Version, *, typed_once: bool) -> tuple[dict[str, Any
     if typed_once:
         return {**document, "schema_version": 2, TYPED_ONCE: True}, None
     return document, version.sha256
+
+
+def _bytes(document: Mapping[str, Any]) -> bytes:
+    try:
+        return document_bytes(document)
+    except ValueError as error:  # half a character, which JSON can escape and no file can hold
+        raise InputError.of(
+            "not-json",
+            "the scene's case holds a text that cannot stand in a case",
+            hazard="H55",
+            next_step="open only scenes that HexaFix saved",
+        ) from error
 
 
 def _step(name: str) -> Step | None:
