@@ -153,3 +153,22 @@ def test_the_byte_that_kills_simpleitk_does_not_kill_the_program(ct_corpus):
     with closing(results), pytest.raises(ImageRefused) as caught:
         next(results)
     assert caught.value.faults[0].hazard == "H52"
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pipes have a size on Linux only")
+def test_a_user_whose_pipes_may_not_grow_gets_his_result_too(monkeypatch, tmp_path):
+    import fcntl
+
+    asked = []
+
+    def refuse(_, what, size):
+        asked.append((what, size))
+        raise PermissionError("pipe-user-pages-soft")
+
+    monkeypatch.setattr(fcntl, "fcntl", refuse)
+    head = json.dumps({"shape": [3], "dtype": "|u1"})
+    body = f"import sys; sys.stdin.read(); sys.stdout.write({head!r} + chr(10) + 'abc')"
+    stand_in(monkeypatch, tmp_path, body)
+    _, array = first_result()
+    assert array.tobytes() == b"abc"
+    assert asked == [(fcntl.F_SETPIPE_SZ, 1 << 20)]

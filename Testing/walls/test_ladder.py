@@ -95,6 +95,7 @@ LIBRARIES = {
         "trame_rca",
         "wslink",
         "aiohttp",
+        "PIL",
         "slicer",
         "vtk",
         "vtkmodules",

@@ -29,15 +29,15 @@ def a_loop():
 def a_workstation(a_loop, a_case_on_disk):
     """The phantom's case, worked through to the ring poses and the target."""
     from hexafix.presenter import Step
-    from hexafix.web.app import Workstation, started_presenter
+    from hexafix.web.app import start_workstation
     from hexafix.web.run import prepare_environment
     from trame_slicer.views.render_scheduler import NoScheduleRendering
 
     prepare_environment()
 
     async def make():
-        presenter = started_presenter(a_case_on_disk)
-        workstation = Workstation(presenter=presenter)
+        workstation = start_workstation(a_case_on_disk)
+        presenter = workstation.presenter
         await settled(presenter)
         presenter.run(Step.POSES)
         await settled(presenter)

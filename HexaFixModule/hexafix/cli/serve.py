@@ -99,10 +99,18 @@ def _measure(case: Path | None) -> int:
             next_step="name a case.json whose CT has the size you want to know about",
         )
     found = times_of(case)
+    if found["image"] is None:
+        raise InputError.of(
+            "nothing-measured",
+            "the CT of the case was not read",
+            where="--measure",
+            next_step="leave --measure out: the workstation says why",
+        )
     times = found["axial_scroll_ms"]
     document = {
         **found,
         "first_picture_s": round(found["first_picture_s"], 2),
+        "views_s": round(found["views_s"], 2),
         "axial_scroll_ms": round(statistics.median(times), 1),
         "axial_scroll_p95_ms": round(statistics.quantiles(times, n=20)[-1], 1),
         "goals": GOALS,

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer
 from typing import IO, Any
@@ -20,6 +20,8 @@ from hexafix.errors import ImageRefused
 
 _PACKAGE_PARENT = Path(__file__).resolve().parents[2]
 _MAX_LINE = 1 << 20
+# What Linux allows to everybody.
+_PIPE_BYTES = 1 << 20
 # Each thread of a library reserves address space, which the child's limit would count.
 _ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
@@ -69,6 +71,7 @@ def run_isolated(
     )
     with process:
         try:
+            _widen(process)
             with _killed_after(seconds, process):
                 _send(process, json.dumps(request).encode())
             while True:
@@ -79,6 +82,14 @@ def run_isolated(
                 yield result
         finally:
             process.kill()
+
+
+def _widen(process: subprocess.Popen[bytes]) -> None:
+    """Fewer, larger reads: each waits for the interpreter lock, which other threads may hold."""
+    with suppress(ImportError, AttributeError, OSError):  # other systems, or a user's limit
+        import fcntl
+
+        fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)  # type: ignore[arg-type]
 
 
 @contextmanager

@@ -6,33 +6,58 @@ import asyncio
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hexafix.web.ahead import link_libraries
 from hexafix.web.files import read_scene
 from hexafix.web.views import Views
 
 if TYPE_CHECKING:
     from hexafix.presenter import Presenter, Snapshot
+    from hexafix.web.starting import FirstPicture
 
 TITLE = "HexaFix"
 
+BEFORE_VTK = (
+    *("hexafix.pipeline", "hexafix.web.panel", "trame.app", "trame.ui.vuetify3"),
+    *("trame.widgets.vuetify3", "trame_rca.encoders", "pydicom"),
+)
+"""What a workstation imports that does not import VTK; trame_slicer needs pydicom."""
 
-def started_presenter(case: Path | None) -> Presenter:
-    """A presenter whose threads come back to the running event loop.
+
+def start_workstation(case: Path | None, *, first: FirstPicture | None = None) -> Workstation:
+    """A workstation as fast as it can be had: what can go side by side does.
+
+    The CT is read on a thread of its own; what is done meanwhile leaves it the interpreter's lock.
 
     Parameters
     ----------
     case : Path or None
-        Case file, or scene, to open; its CT is read at once, while the page is still being built.
+        Case file, or scene, to open.
+    first : FirstPicture or None
+        Is told where the CT is to be had.
     """
-    from hexafix.presenter import Presenter, Step
+    from hexafix.presenter import Step
 
-    post = asyncio.get_running_loop().call_soon_threadsafe
-    presenter = Presenter(post=post, read_scene=read_scene)
+    presenter = started_presenter()
+    if first is not None:
+        first.volume = lambda: presenter.value(Step.LOAD)
     if case is not None and presenter.open_case(case):
         presenter.run(Step.LOAD)
-    return presenter
+    for name in BEFORE_VTK:
+        import_module(name)
+    link_libraries()
+    return Workstation(presenter=presenter)
+
+
+def started_presenter() -> Presenter:
+    """A presenter whose threads come back to the running event loop."""
+    from hexafix.presenter import Presenter
+
+    post = asyncio.get_running_loop().call_soon_threadsafe
+    return Presenter(post=post, read_scene=read_scene)
 
 
 def quiet_vtk() -> None:
@@ -107,7 +132,7 @@ class Workstation:
         self.state, self.ctrl = self.server.state, self.server.controller
         quiet_vtk()
         self.app = SlicerApp()
-        self.presenter = presenter or started_presenter(None)
+        self.presenter = presenter or started_presenter()
         self.logic = SceneLogic(self.app.scene, app_logic=self.app.app_logic)
         self.sync = SceneSync(self.logic, self.presenter)
         self.state.trame__title = TITLE

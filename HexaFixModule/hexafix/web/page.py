@@ -1,4 +1,4 @@
-"""The page itself: trame's index with our title, and the policy that keeps it on this machine."""
+"""The page itself: trame's index with our start, and the policy that keeps it on this machine."""
 
 from __future__ import annotations
 
@@ -15,9 +15,17 @@ if TYPE_CHECKING:
 
 PAGE_NAMES = ("/", "/index.html")
 
+STATIC = Path(__file__).with_name("static")
+
+CLIENT = re.compile(r'<script type="module"[^>]*\bsrc="([^"]+)"[^>]*></script>')
+"""Where trame's page loads its client."""
+
+LOADER = re.compile(r"<script>[^<]*loading\.tpl.*?</script>", re.DOTALL)
+"""What trame's page does meanwhile."""
+
 
 def index_text(folder: Path) -> str:
-    """Trame's page with our title; its scripts' names are the installed version's own.
+    """Trame's page with our title, which waits for the workstation; scripts' names are trame's own.
 
     Parameters
     ----------
@@ -26,7 +34,18 @@ def index_text(folder: Path) -> str:
     """
     text = (folder / "index.html").read_text("utf-8")
     text = re.sub(r"<title>.*?</title>", "<title>HexaFix</title>", text)
-    return re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:," />', text)
+    text = re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:," />', text)
+    if CLIENT.search(text) is None or LOADER.search(text) is None:
+        return text
+    own = {name: (STATIC / f"starting.{name}").read_text("utf-8") for name in ("html", "js")}
+    text = CLIENT.sub(r'<link rel="modulepreload" crossorigin href="\1">', text)
+    text = LOADER.sub(lambda _: f"<script>\n{own['js']}</script>", text)
+    return text.replace('<div id="app"></div>', f'<div id="app">\n{own["html"]}</div>')
+
+
+def waits(text: str) -> bool:
+    """Whether the page asks when the workstation is there, and so may be served before it."""
+    return "modulepreload" in text
 
 
 def policy(text: str) -> str:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
-import gc
 import os
 import signal
 import socket
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexafix.errors import InputError
+from hexafix.web.ahead import hurry
 from hexafix.web.server import Access, Guard, add_downloads
+
+if TYPE_CHECKING:
+    from hexafix.web.starting import StartingServer
 
 CLOSING_S = 3.0
 """How long clients get to say goodbye."""
@@ -50,15 +54,12 @@ def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> 
     access : Access
         Where to listen and who may ask.
     ready : callable
-        Called once with the address to open.
+        Called once with the address to open: at once, while the workstation is still starting.
     """
     prepare_environment()
     require_free(access)
-    # Thousands of modules' objects live to the end: looking for garbage among them costs a tenth
-    # of the start.
-    gc.disable()
     with suppress(KeyboardInterrupt):
-        asyncio.run(_serve(case, access, ready))
+        asyncio.run(_serve(case, access, ready, has_started=hurry()))
 
 
 def require_free(access: Access) -> None:
@@ -84,34 +85,78 @@ def address_not_free(access: Access, error: OSError) -> InputError:
     )
 
 
-async def _serve(case: Path | None, access: Access, ready: Callable[[str], Any]) -> None:
-    from hexafix.web.app import Workstation, started_presenter
+async def _serve(
+    case: Path | None,
+    access: Access,
+    ready: Callable[[str], Any],
+    *,
+    has_started: Callable[[], Any],
+) -> None:
+    from hexafix.web.app import start_workstation
 
     stop = asyncio.Event()
     with suppress(NotImplementedError):
         for name in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(name, stop.set)
-    presenter = started_presenter(case)
-    workstation = Workstation(presenter=presenter)
-    server = workstation.server
-    server.controller.on_server_bind.add(lambda bound: guard(bound, access, workstation))
-    server.controller.on_server_ready.add(lambda **_: _started(ready, access.url(server.port)))
-    running = asyncio.ensure_future(start(server, access))
-    stopped = asyncio.ensure_future(stop.wait())
+    folder, text = trame_page()
+    with starting(access, folder, text) as waiting:
+        if waiting is not None:
+            access = replace(access, port=waiting.port)
+            ready(access.url(access.port))
+        workstation = start_workstation(case, first=waiting.first if waiting else None)
+        server = workstation.server
+
+        def bind(bound: Any) -> None:
+            guard(bound, access, workstation, text)
+            if waiting is not None:
+                waiting.close()
+
+        def begin(**_: Any) -> None:
+            if waiting is None:
+                ready(access.url(server.port))
+            has_started()
+
+        server.controller.on_server_bind.add(bind)
+        server.controller.on_server_ready.add(begin)
+        running = asyncio.ensure_future(start(server, access))
+        stopped = asyncio.ensure_future(stop.wait())
+        try:
+            await asyncio.wait({running, stopped}, return_when=asyncio.FIRST_COMPLETED)
+            if running.done():
+                running.result()
+        except OSError as error:
+            raise address_not_free(access, error) from error
+        finally:
+            await _end(workstation, running, stopped)
+
+
+def trame_page() -> tuple[Path, str]:
+    """Trame's static folder, and its page as we serve it."""
+    from trame_client.module import vue3
+
+    from hexafix.web.page import index_text
+
+    folder = Path(vue3.www)
+    return folder, index_text(folder)
+
+
+@contextmanager
+def starting(access: Access, folder: Path, text: str) -> Iterator[StartingServer | None]:
+    """Serve the waiting page meanwhile; None where trame's page is not one that can wait."""
+    from hexafix.web.page import waits
+    from hexafix.web.starting import StartingServer
+
+    if not waits(text):
+        yield None
+        return
     try:
-        await asyncio.wait({running, stopped}, return_when=asyncio.FIRST_COMPLETED)
-        if running.done():
-            running.result()
+        server = StartingServer(access, folder, text)
     except OSError as error:
         raise address_not_free(access, error) from error
+    try:
+        yield server
     finally:
-        await _end(workstation, running, stopped)
-
-
-def _started(ready: Callable[[str], Any], url: str) -> None:
-    gc.freeze()
-    gc.enable()
-    ready(url)
+        server.close()
 
 
 def start(server: Any, access: Access) -> Any:
@@ -130,18 +175,17 @@ def start(server: Any, access: Access) -> Any:
     )
 
 
-def guard(bound: Any, access: Access, workstation: Any) -> None:
+def guard(bound: Any, access: Access, workstation: Any, text: str) -> None:
     """Guard, page and downloads before trame's own routes, and encryption if it is asked for."""
-    from trame_client.module import vue3
-
-    from hexafix.web.page import add_page, index_text, policy
+    from hexafix.web.page import add_page, policy
+    from hexafix.web.starting import add_ready
 
     app = bound.app
     if access.tls is not None:
         bound.config["ssl"] = access.tls
-    text = index_text(Path(vue3.www))
     Guard(access, policy(text)).install(app)
     add_page(app, text)
+    add_ready(app)
     add_downloads(app, workstation.panel.downloads)
 
 
