@@ -231,8 +231,8 @@ def test_a_deformity_typed_in_the_page_is_the_presenters_case(
         name, _, unit = key.rpartition("_")
         if unit in ("deg", "mm") and name != "origin_lps":
             desk.write(f"draft-{name}", f"{value:g}")
-        elif isinstance(value, str) and key not in ("kind", "moving"):
-            choose(desk, f"draft-{key}-word", value)
+        elif isinstance(value, str) and key != "kind":
+            choose(desk, key if key == "moving" else f"draft-{key}-word", value)
     for k, value in enumerate(DEFORMITY["origin_lps_mm"]):
         desk.write(f"draft-origin-{k}", f"{value:g}")
     desk.click("set-correction")

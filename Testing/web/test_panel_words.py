@@ -218,6 +218,22 @@ def test_a_case_with_odd_values_is_shown_without_them(odd_documents):
     presenter.close()
 
 
+@pytest.mark.parametrize("kind", ["fragment-motion", "deformity"])
+def test_the_fragment_that_moves_is_never_guessed(kind):
+    numbers = {"center": ["1", "2", "3"], "origin": ["1", "2", "3"]}
+    draft = drafts.empty() | numbers | {"kind": kind}
+    with pytest.raises(InputError) as refused:
+        drafts.to_document(draft)
+    assert refused.value.faults[0].code == "moving-not-chosen"
+    for moving in drafts.FRAGMENTS:
+        assert drafts.to_document(draft | {"moving": moving})["moving"] == moving
+
+
+def test_a_deformity_that_does_not_say_it_moves_the_distal_fragment():
+    told = {k: v for k, v in CORRECTIONS["deformity"].items() if k != "moving"}
+    assert drafts.of_document(told, drafts.empty())["moving"] == "distal"
+
+
 def test_a_field_that_is_no_number_names_itself():
     draft = drafts.empty() | {"kind": "target-pose", "position": ["0", "1,5", "178"]}
     with pytest.raises(InputError) as refused:

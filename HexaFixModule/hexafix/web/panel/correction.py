@@ -88,7 +88,7 @@ class CorrectionStep:
         with html.Div(
             v_if=f"{draft}.kind === 'landmarks'", classes="hxp-form", **marked("form-landmarks")
         ):
-            self._landmarks.build(f"{draft}.moving")
+            self._landmarks.build(f"({draft}.moving || 'moving')")
         with html.Div(
             v_if=f"{draft}.kind === 'deformity'", classes="hxp-form", **marked("form-deformity")
         ):
@@ -143,7 +143,7 @@ class CorrectionStep:
             label="Fragment that moves",
             v_model=(f"{draft}.moving",),
             update_modelValue=f"flushState('{draft}')",
-            items=("['proximal', 'distal']",),
+            items=([*drafts.FRAGMENTS],),
             density="compact",
             variant="outlined",
             hide_details=True,
@@ -313,15 +313,21 @@ class CorrectionStep:
         draft = self._data.draft
         make: Callable[[], Mapping[str, Any]] = lambda: drafts.to_document(draft)  # noqa: E731
         if draft["kind"] == "landmarks":
-            make = lambda: self._landmarks.to_document(draft["moving"])  # noqa: E731
+            make = lambda: self._landmarks.to_document(drafts.moving_of(draft))  # noqa: E731
         if self._context.act(lambda: self._context.presenter.set_correction(dict(make()))):
             self._landmarks.hold()
             self._set = dict(self._data.draft)
             self._judge_draft()
 
     def _toggle_drag(self) -> None:
-        self._data.dragging = not self._data.dragging
-        self._context.controls.drag_fragment(self._data.dragging, self._data.draft["moving"])
+        on = not self._data.dragging
+
+        def drag() -> None:
+            moving = drafts.moving_of(self._data.draft) if on else ""
+            self._data.dragging = on
+            self._context.controls.drag_fragment(on, moving)
+
+        self._context.act(drag)
 
     def _pick(self, key: str) -> None:
         if self._data.picking:

@@ -27,6 +27,8 @@ DEFORMITY = (
 )
 """The six clinical parameters: key, label, unit and the two words of their direction."""
 
+FRAGMENTS = ("proximal", "distal")
+
 ZEROS = ("0", "0", "0")
 
 
@@ -34,7 +36,7 @@ def empty() -> dict[str, Any]:
     """A draft of nothing: no motion, no deformity."""
     draft: dict[str, Any] = {
         "kind": "fragment-motion",
-        "moving": "distal",
+        "moving": None,
         "translation": [*ZEROS],
         "angles": [*ZEROS],
         "center": ["", "", ""],
@@ -57,7 +59,9 @@ def of_document(correction: Mapping[str, Any], draft: Mapping[str, Any]) -> dict
         The draft as it stands; its ``center`` is what a fragment motion is told about.
     """
     new = {**draft, "kind": correction["kind"]}
-    new["moving"] = correction.get("moving", draft["moving"])
+    # a deformity that does not say it is the distal fragment's
+    other = "distal" if correction["kind"] == "deformity" else draft["moving"]
+    new["moving"] = correction.get("moving", other)
     match correction["kind"]:
         case "target-pose":
             new["position"] = _words(correction["position_mm"])
@@ -99,7 +103,7 @@ def to_document(draft: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        For the first field that holds no number.
+        For the first field that holds no number, or if the fragment that moves is not chosen.
     """
     from hexafix.pipeline import motion_matrix
 
@@ -118,10 +122,10 @@ def to_document(draft: Mapping[str, Any]) -> dict[str, Any]:
             )
             return {
                 "kind": "fragment-motion",
-                "moving": draft["moving"],
+                "moving": moving_of(draft),
                 "matrix_lps": [[*row] for row in matrix],
             }
-    made: dict[str, Any] = {"kind": "deformity", "moving": draft["moving"]}
+    made: dict[str, Any] = {"kind": "deformity", "moving": moving_of(draft)}
     made["origin_lps_mm"] = _numbers(draft, "origin")
     for key, _, unit, _ in DEFORMITY:
         value = number(draft[key], where=f"correction.{key}")
@@ -129,6 +133,24 @@ def to_document(draft: Mapping[str, Any]) -> dict[str, Any]:
         if draft[f"{key}_word"]:
             made[key] = draft[f"{key}_word"]
     return made
+
+
+def moving_of(draft: Mapping[str, Any]) -> str:
+    """The fragment that moves: chosen by the user, never for him.
+
+    Raises
+    ------
+    InputError
+        If none is chosen.
+    """
+    if draft["moving"] not in FRAGMENTS:
+        raise InputError.of(
+            "moving-not-chosen",
+            "the fragment that moves is not chosen",
+            where="correction.moving",
+            next_step="choose proximal or distal",
+        )
+    return draft["moving"]
 
 
 def _words(values: Sequence[float]) -> list[str]:
