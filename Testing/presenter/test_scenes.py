@@ -281,6 +281,36 @@ def test_the_ct_of_a_scene_is_read_from_it_again_when_others_took_its_place(
     assert another.value(Step.EXPORT).made == made
 
 
+def test_a_scene_saved_over_its_own_file_need_not_be_read_again(
+    a_scene, another, save_fake_scene, tmp_path
+):
+    another.open_scene(a_scene)
+    another.confirm_side("left")
+    reads = another.engine.calls.count("read_image")
+    save_fake_scene(another, a_scene, step="export")
+    another.scene_written(a_scene, another.value(Step.LOAD))
+    assert exported(another, tmp_path / "out")
+    assert another.engine.calls.count("read_image") == reads
+
+
+def test_a_scene_written_with_an_older_ct_leaves_the_present_one_to_be_read(
+    a_scene, another, save_fake_scene, tmp_path
+):
+    another.open_scene(a_scene)
+    older = another.value(Step.LOAD)
+    (tmp_path / "other.txt").write_text("another image")
+    another.load_image(tmp_path / "other.txt")
+    present = another.value(Step.LOAD)
+    another.scene_written(a_scene, older)
+    another.scene_written(a_scene, present)
+    assert another.value(Step.LOAD) is present
+    another.undo()
+    save_fake_scene(another, a_scene, volume="a third image, of another length")
+    another.scene_written(a_scene, present)
+    another.run(Step.LOAD)
+    assert another.value(Step.LOAD).made == "a third image, of another length"
+
+
 def test_a_scene_with_another_ct_in_its_place_greys_what_was_computed(
     a_scene, another, a_planned, save_fake_scene, tmp_path
 ):

@@ -44,7 +44,13 @@ def scene(views, request):
 
     server = get_server(f"scene-{request.node.name}", client_type="vue3")
     data, name = typed_state(server, PanelState)
-    presenter = SimpleNamespace(snapshot=SimpleNamespace(banners=(), busy=False))
+    written = []
+    presenter = SimpleNamespace(
+        snapshot=SimpleNamespace(banners=(), busy=False),
+        value={"load": "the CT"}.get,
+        scene_written=lambda *what: written.append(what),
+        written=written,
+    )
     return SceneFile(PanelContext(server, presenter, views, data=data, name=name), None)
 
 
@@ -75,6 +81,7 @@ def test_a_saved_scene_is_told_with_its_place(scene, tmp_path):
     assert (tmp_path / "tibia.mrb").read_bytes() == b"scene"
     assert scene._data.saved == str(tmp_path / "tibia.mrb")
     assert not scene._data.saving
+    assert scene._context.presenter.written == [(tmp_path / "tibia.mrb", "the CT")]
 
 
 def test_a_file_is_replaced_only_when_the_user_says_so(scene, tmp_path):

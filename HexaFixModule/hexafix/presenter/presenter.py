@@ -93,6 +93,25 @@ class Presenter(BallEdits, Work):
         with self.lock:
             return scenes.case_for_scene(self.version, typed_once=self.typed_once)
 
+    def scene_written(self, path: str | Path, volume: Any) -> None:
+        """A scene with this CT was written: it is not read again where it is the case's own file.
+
+        Parameters
+        ----------
+        path : path
+        volume : Volume
+            `value(Step.LOAD)` when the scene was taken; another CT stays to be read.
+        """
+        with self.lock:
+            read, inputs = self.result(Step.LOAD), self.inputs
+            if self.closed or read is None or read.value is not volume or volume is None:
+                return
+            if inputs.image_path != Path(path).resolve():
+                return
+            self.look_again()
+            self._store(self.inputs, loaded(self.inputs, volume, read.document))
+            self.refresh()
+
     @action
     def new_case(self) -> None:
         """Begin a case."""

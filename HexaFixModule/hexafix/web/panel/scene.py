@@ -159,9 +159,11 @@ class SceneFile:
         taken: list[TakenScene] = []
         try:
             context.plan(lambda: taken.append(context.controls.take_scene()))
+            volume = context.presenter.value("load")
             for scene in taken:
                 told = self._teller(loop)
                 await loop.run_in_executor(None, partial(scene.write, Path(path), progress=told))
+                context.presenter.scene_written(Path(path), volume)
                 with context.server.state:
                     self._data.saved = path
         except HexaFixError as error:
