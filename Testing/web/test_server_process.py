@@ -67,9 +67,8 @@ def test_the_page_shows_the_ct_in_all_views_and_asks_nobody_else(a_server, a_pag
     a_page.wait_for_function(shown, timeout=60000)
     for edge, letter in (("left", "R"), ("right", "L"), ("top", "A"), ("bottom", "P")):
         assert a_page.locator(f'[data-testid="Red-{edge}"]').inner_text() == letter
-    assert re.fullmatch(
-        r"[\d.]+ mm [HF]", a_page.locator('[data-testid="Red-position"]').inner_text()
-    )
+    place = a_page.locator('[data-testid="Red-position"]').inner_text()
+    assert re.fullmatch(r"S -?[\d.]+ mm in the middle\s+tilted [\d.]+°", place), place
     assert {urlsplit(asked).hostname for asked in a_page.asked if "blob:" not in asked} == {
         "127.0.0.1"
     }
