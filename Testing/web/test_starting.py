@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 from hexafix.web.ahead import PACKAGES, extension_files, hurry, link_libraries
 from hexafix.web.app import BEFORE_VTK
 from hexafix.web.page import index_text, waits
-from hexafix.web.run import starting, trame_page
+from hexafix.web.run import SIGNALS, interruptible, starting, trame_page
 from hexafix.web.server import access
 from hexafix.web.starting import FirstPicture, StartingServer
 from PIL import Image
@@ -199,3 +200,19 @@ def test_a_browser_sees_the_ct_first_and_then_the_views(start_serving, a_case_on
     a_page.wait_for_selector('[data-testid="step-load"]', timeout=60_000)
     assert a_page.locator("#hexafix-starting").count() == 0
     assert a_page.said == []
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_a_signal_ends_a_start_and_leaves_the_handlers_as_they_were(name):
+    before = signal.getsignal(name)
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        signal.raise_signal(name)
+    assert signal.getsignal(name) is before
+
+
+def test_an_interrupted_start_ends_quietly(start_serving):
+    process, _ = start_serving()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert said == "hexafix: the workstation has ended\n"

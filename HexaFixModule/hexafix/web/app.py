@@ -44,12 +44,16 @@ def start_workstation(case: Path | None, *, first: FirstPicture | None = None) -
     presenter = started_presenter()
     if first is not None:
         first.volume = lambda: presenter.value(Step.LOAD)
-    if case is not None and presenter.open_case(case):
-        presenter.run(Step.LOAD)
-    for name in BEFORE_VTK:
-        import_module(name)
-    link_libraries()
-    return Workstation(presenter=presenter)
+    try:
+        if case is not None and presenter.open_case(case):
+            presenter.run(Step.LOAD)
+        for name in BEFORE_VTK:
+            import_module(name)
+        link_libraries()
+        return Workstation(presenter=presenter)
+    except BaseException:
+        presenter.close()
+        raise
 
 
 def started_presenter() -> Presenter:

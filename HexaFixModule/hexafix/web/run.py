@@ -21,6 +21,9 @@ from hexafix.web.server import Access, Guard, add_downloads
 if TYPE_CHECKING:
     from hexafix.web.starting import StartingServer
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""What ends the workstation."""
+
 CLOSING_S = 3.0
 """How long clients get to say goodbye."""
 
@@ -60,6 +63,7 @@ def serve(case: Path | None, access: Access, *, ready: Callable[[str], Any]) -> 
     require_free(access)
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(case, access, ready, has_started=hurry()))
+    print("hexafix: the workstation has ended", file=sys.stderr)
 
 
 def require_free(access: Access) -> None:
@@ -94,16 +98,17 @@ async def _serve(
 ) -> None:
     from hexafix.web.app import start_workstation
 
-    stop = asyncio.Event()
-    with suppress(NotImplementedError):
-        for name in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(name, stop.set)
     folder, text = trame_page()
     with starting(access, folder, text) as waiting:
-        if waiting is not None:
-            access = replace(access, port=waiting.port)
-            ready(access.url(access.port))
-        workstation = start_workstation(case, first=waiting.first if waiting else None)
+        with interruptible():
+            if waiting is not None:
+                access = replace(access, port=waiting.port)
+                ready(access.url(access.port))
+            workstation = start_workstation(case, first=waiting.first if waiting else None)
+        stop = asyncio.Event()
+        with suppress(NotImplementedError):
+            for name in SIGNALS:
+                asyncio.get_running_loop().add_signal_handler(name, stop.set)
         server = workstation.server
 
         def bind(bound: Any) -> None:
@@ -128,6 +133,21 @@ async def _serve(
             raise address_not_free(access, error) from error
         finally:
             await _end(workstation, running, stopped)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let a signal end what keeps the event loop from running; the loop would only note it."""
+
+    def end(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = {name: signal.signal(name, end) for name in SIGNALS}
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(name, handler)
 
 
 def trame_page() -> tuple[Path, str]:
@@ -195,4 +215,3 @@ async def _end(workstation: Any, running: Any, stopped: Any) -> None:
         await asyncio.wait_for(workstation.server.stop(), CLOSING_S)
     for task in (running, stopped):
         task.cancel()
-    print("hexafix: the workstation has ended", file=sys.stderr)
