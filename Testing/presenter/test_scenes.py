@@ -126,6 +126,7 @@ def test_readings_typed_once_are_still_to_be_repeated(
     assert another.snapshot.confirmed["readings_needed"]
     assert not another.snapshot.can_export
     assert "readings_to_repeat" not in another.snapshot.document
+    assert another.version.sha256 == hashlib.sha256(another.version.raw).hexdigest()
     a_planned.repeat_readings(a_planned.version.content["strut_readings_mm"])
     save_fake_scene(a_planned, tmp_path / "twice.mrb")
     another.open_scene(tmp_path / "twice.mrb")
@@ -309,6 +310,12 @@ def test_a_scene_written_with_an_older_ct_leaves_the_present_one_to_be_read(
     another.scene_written(a_scene, present)
     another.run(Step.LOAD)
     assert another.value(Step.LOAD).made == "a third image, of another length"
+
+
+def test_a_scene_written_elsewhere_says_nothing_of_a_ct_that_changed_on_disk(a_planned, tmp_path):
+    (tmp_path / "ct.txt").write_text("another image")
+    a_planned.scene_written(tmp_path / "elsewhere.mrb", a_planned.value(Step.LOAD))
+    assert not a_planned.export(tmp_path / "out")
 
 
 def test_a_scene_with_another_ct_in_its_place_greys_what_was_computed(
