@@ -122,6 +122,18 @@ def test_the_ct_is_drawn_once(a_phantom, monkeypatch):
     assert len(drawn) == 1
 
 
+def test_a_picture_that_cannot_be_made_does_not_hold_up_the_start():
+    first, asked = FirstPicture(), []
+    first.volume = lambda: asked.append("once") or object()
+    assert [first.state()["picture"] for _ in range(3)] == ["", "", ""]
+    assert asked == ["once"]
+
+
+def test_a_server_that_cannot_be_made_says_so(tmp_path):
+    with pytest.raises(ValueError, match="does not exist"):
+        StartingServer(access(), tmp_path / "nowhere", "")
+
+
 def test_the_installed_trame_page_can_wait_and_a_strange_one_starts_as_it_is(tmp_path):
     folder, text = trame_page()
     assert waits(text)

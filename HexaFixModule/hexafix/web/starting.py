@@ -75,7 +75,12 @@ class StartingServer:
         self._thread.join()
 
     def _run(self) -> None:
-        asyncio.run(self._serve())
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:
+            if self._bound.done():
+                raise
+            self._bound.set_exception(error)
 
     async def _serve(self) -> None:
         from aiohttp import web
@@ -93,12 +98,10 @@ class StartingServer:
         site = web.TCPSite(runner, access.host, access.port, ssl_context=access.tls)
         try:
             await site.start()
-        except OSError as error:
-            self._bound.set_exception(error)
-        else:
             self._bound.set_result(runner.addresses[0][1])
             await self._end.wait()
-        await runner.cleanup()
+        finally:
+            await runner.cleanup()
 
     async def _state(self, request: web.Request) -> web.Response:
         """Answer once there is something new: the picture, or the end."""
@@ -141,7 +144,11 @@ class FirstPicture:
         """What the page shows now."""
         with self._lock:
             if self.png is None and (volume := self.volume()) is not None:
-                self._make(volume)
+                try:
+                    self._make(volume)
+                except Exception:
+                    # The start goes on without a picture; what is wrong shows in the views.
+                    self.volume = lambda: None
         seen = self.png is not None
         text = "The views are being made ready." if seen else "The workstation is starting."
         return {"text": text, "picture": self.place}
