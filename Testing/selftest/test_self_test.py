@@ -4,10 +4,12 @@ import tempfile
 
 import numpy as np
 import pytest
+import scipy.linalg.lapack
+import scipy.ndimage
 import scipy.spatial.transform
 from hexafix.errors import SelfTestFailed
-from hexafix.imaging import Volume, dicom_header, gantry_tilt, pixel_data
-from hexafix.kinematics import inverse, newton
+from hexafix.imaging import Volume, dicom_header, pixel_data
+from hexafix.kinematics import inverse
 from hexafix.pipeline import plan_and_export, plan_correction
 from hexafix.selftest import motion, require_self_test, run
 from hexafix.selftest.foreign import codec_checks, image_file_checks
@@ -80,7 +82,7 @@ def slices_are_stacked_upside_down(monkeypatch):
 @sabotage("gantry tilt")
 def scipys_spline_filter_is_a_voxel_off(monkeypatch):
     monkeypatch.setattr(
-        gantry_tilt, "spline_filter1d", lambda rows, axis, **_: np.roll(rows, 1, axis)
+        scipy.ndimage, "spline_filter1d", lambda rows, axis, **_: np.roll(rows, 1, axis)
     )
 
 
@@ -139,13 +141,13 @@ def struts_are_counted_from_the_other_end(monkeypatch):
 
 @sabotage("forward kinematics")
 def lapack_solves_with_the_wrong_sign(monkeypatch):
-    solve = newton.dgesv
+    solve = scipy.linalg.lapack.dgesv
 
     def wrong(*args, **options):
         *factors, solution, info = solve(*args, **options)
         return *factors, -solution, info
 
-    monkeypatch.setattr(newton, "dgesv", wrong)
+    monkeypatch.setattr(scipy.linalg.lapack, "dgesv", wrong)
 
 
 LIBRARY = {
