@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,13 @@ METAL_SHARE = 5e-4
 
 SAMPLED = 500_000
 """Voxels looked at for the window."""
+
+
+SCIPY = (
+    *("scipy.linalg.lapack", "scipy.ndimage", "scipy.sparse", "scipy.spatial.transform"),
+    "scipy.special",
+)
+"""What the chain from balls to schedule uses of SciPy."""
 
 
 def image_series(path: Path, *, progress: Progress = silent) -> dict[str, Any]:
@@ -111,8 +119,19 @@ def find_case_balls(
         removed_lps_mm=np.asarray(removed_lps_mm, float),
     )
     if found is None:
+        _load_scipy()
         found = find_balls(volume, ball_diameter_mm=ball_diameter_mm, progress=progress)
     return edited_balls(volume, found, edits, ball_diameter_mm=ball_diameter_mm)
+
+
+def _load_scipy() -> None:
+    """Import what the chain uses of SciPy here, on one thread.
+
+    Its parts are imported when they are first used, and a workstation computes on two threads: two
+    that import parts of one package at the same time can fail. Every other step follows this one.
+    """
+    for name in SCIPY:
+        import_module(name)
 
 
 def balls_document(balls: BallSet) -> dict[str, Any]:
