@@ -113,8 +113,10 @@ class StartingServer:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._end.wait(), LOOK_S)
             state = self.first.state()
-        wait_ms = HAND_OVER_MS if self._end.is_set() else 0
-        return web.json_response({**state, "wait_ms": wait_ms})
+        if self._end.is_set():
+            # The picture could not be fetched any more.
+            state = {**state, "picture": "", "wait_ms": HAND_OVER_MS}
+        return web.json_response(state)
 
     async def _picture(self, _: web.Request) -> web.Response:
         from aiohttp import web
@@ -151,7 +153,7 @@ class FirstPicture:
                     self.volume = lambda: None
         seen = self.png is not None
         text = "The views are being made ready." if seen else "The workstation is starting."
-        return {"text": text, "picture": self.place}
+        return {"text": text, "picture": self.place, "wait_ms": 0}
 
     def _make(self, volume: Any) -> None:
         from PIL import Image
