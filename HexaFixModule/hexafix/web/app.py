@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hexafix.web.ahead import link_libraries
-from hexafix.web.files import read_scene
 from hexafix.web.views import Views
 
 if TYPE_CHECKING:
@@ -58,6 +57,9 @@ def start_workstation(case: Path | None, *, first: FirstPicture | None = None) -
 
 def started_presenter() -> Presenter:
     """A presenter whose threads come back to the running event loop."""
+    # Here, and not on the presenter's thread when a scene is opened: two threads that import parts
+    # of one package at the same time can fail.
+    from hexafix.mrml.scene_file import read_scene
     from hexafix.presenter import Presenter
 
     post = asyncio.get_running_loop().call_soon_threadsafe

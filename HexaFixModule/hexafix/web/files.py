@@ -1,15 +1,10 @@
-"""The server's own folders as a chooser shows them, and the reader of the scenes in them."""
+"""The server's own folders as a chooser shows them: cases, scenes and images, nothing else."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hexafix.errors import InputError
-from hexafix.progress import Progress, silent
-
-if TYPE_CHECKING:
-    from hexafix.presenter.scenes import SceneContent
 
 CASE_SUFFIXES = (".json",)
 SCENE_SUFFIXES = (".mrb",)
@@ -22,14 +17,6 @@ MOST_ENTRIES = 500
 def start_folder(case_path: str | None) -> Path:
     """Where a chooser opens: beside the case, else where the program was started."""
     return Path(case_path).resolve().parent if case_path else Path.cwd()
-
-
-def read_scene(path: Path, *, progress: Progress = silent) -> SceneContent:
-    """Case and CT of a scene's file; see `hexafix.mrml.scene_file.read_scene`."""
-    # Not at the top: a start without a scene need not wait for it.
-    from hexafix.mrml.scene_file import read_scene as read
-
-    return read(path, progress=progress)
 
 
 def listing(folder: Path, suffixes: tuple[str, ...]) -> dict[str, object]:
