@@ -225,10 +225,11 @@ def _apart(fitted: list[FittedBall], radius: float) -> tuple[list[FittedBall], l
     for one in sorted(fitted, key=lambda f: f.ball.rms_residual_mm):
         gaps = [float(np.linalg.norm(one.ball.center_mm - k.ball.center_mm)) for k in kept]
         nearest = min(gaps, default=np.inf)
-        if nearest >= 2.0 * radius - OVERLAP_MM:
+        limit = 2.0 * radius - OVERLAP_MM
+        if nearest >= limit:
             kept.append(one)
         elif nearest > 0.5 * radius:
-            reason = f"overlap: {nearest:.1f} mm from another ball, limit {2 * radius:.1f} mm"
+            reason = f"overlap: {nearest:.1f} mm from another ball, limit {limit:.1f} mm"
             doubled.append(Rejected(one.ball.center_mm, reason))
     return kept, doubled
 
