@@ -13,6 +13,7 @@ import statistics
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
@@ -21,18 +22,8 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-backgroun
 LONG_MS = 120_000
 
 FIRST = "() => document.querySelector('#hexafix-starting-image')?.naturalWidth > 100"
-VIEWS = """() => [...document.querySelectorAll('img')]
-  .filter(image => image.src.startsWith('blob:') && image.naturalWidth > 50)
-  .some(image => {
-    const canvas = document.createElement('canvas');
-    canvas.width = canvas.height = 100;
-    const pen = canvas.getContext('2d');
-    pen.drawImage(image, 0, 0, 100, 100);
-    const pixels = pen.getImageData(0, 0, 100, 100).data;
-    const seen = new Set();
-    for (let k = 0; k < pixels.length; k += 4) seen.add(pixels[k] >> 4);
-    return seen.size > 6;
-  })"""
+SHADES = Path(__file__).with_name("shades.js").read_text("utf-8").partition("\n")[2].strip()
+VIEWS = f"() => ({SHADES})().some(shades => shades > 6)"
 
 
 def one_start(browser, case):
